@@ -1,0 +1,1 @@
+"""weftform: forming simulation of dry woven reinforcements."""

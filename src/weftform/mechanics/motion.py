@@ -1,0 +1,40 @@
+"""Smooth prescribed motions: a value that goes from one knot to the next with soft starts and stops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from weftform.mechanics.compiled import scalar
+
+
+@scalar
+def soft_progress(progress: float, ramp: float) -> float:
+    """Travelled share (0..1) at the time share ``progress``, with constant speed but for ``ramp`` at each end.
+
+    In a ramp the speed follows the smooth step ``3 x^2 - 2 x^3``, so acceleration is continuous and starts from zero;
+    the speed between the ramps is ``1 / (1 - ramp)`` of the mean. ``0 < ramp <= 0.5``.
+    """
+    peak = 1.0 / (1.0 - ramp)
+    if progress <= 0.0:
+        return 0.0
+    if progress >= 1.0:
+        return 1.0
+    if progress < ramp:
+        x = progress / ramp
+        return peak * ramp * x * x * x * (1.0 - 0.5 * x)
+    if progress > 1.0 - ramp:
+        x = (1.0 - progress) / ramp
+        return 1.0 - peak * ramp * x * x * x * (1.0 - 0.5 * x)
+    return peak * (progress - 0.5 * ramp)
+
+
+@scalar
+def motion_value(times: Any, values: Any, knots: int, ramp: float, time: float) -> float:
+    """Value at ``time`` of a motion through ``knots`` points, soft between each pair."""
+    if time <= times[0]:
+        return values[0]
+    for k in range(knots - 1):
+        if time < times[k + 1]:
+            progress = (time - times[k]) / (times[k + 1] - times[k])
+            return values[k] + (values[k + 1] - values[k]) * soft_progress(progress, ramp)
+    return values[knots - 1]
