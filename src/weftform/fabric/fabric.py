@@ -105,7 +105,7 @@ class Fabric:
     --------
     >>> fabric = Fabric.load("hexforce-48600-c1300")
     >>> round(float(fabric.warp.force(3.9)))
-    10989
+    10992
     """
 
     card: FabricCard
