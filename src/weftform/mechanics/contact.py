@@ -40,8 +40,9 @@ def rounded_edge(
 def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
-    Returns the three components and the excess that was cut off [N]: excess / tangential stiffness is the slip.
+    Returns the three components and (excess cut off) x (force kept) [N^2]: divided by the tangential stiffness it is the heat.
     """
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))
-    return share * trial_x, share * trial_y, share * trial_z, size - share * size
+    kept = share * size
+    return share * trial_x, share * trial_y, share * trial_z, (size - kept) * kept

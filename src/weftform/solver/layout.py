@@ -1,0 +1,103 @@
+"""Where each field of a crossing lies in the state array.
+
+The state is one flat array of rows; a row holds, one after the other, the fields of all crossings of one weft index, each padded to
+``stride`` numbers. Fields of the cell (i, j) and of the connectors that start at a crossing lie with the crossing (i, j). Row
+length and stride are constants of the compiled loop, so that LLVM can prove that fields do not overlap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+POSITION = 0
+VELOCITY = 3
+INVERSE_MASS = 6
+AREA = 9
+WARP_LINE = 10
+WEFT_LINE = 11
+VOLUME = 12
+INERTIA = 13
+"""Area whose mass the crossing carries [mm2]: AREA, or more where an edge yarn would be light for its stiffness."""
+DAMPED = 14
+"""Work of the damping at the crossing, accumulated [mJ]."""
+LEDGER = 15
+"""Per cell: ln l1, ln l2, shear angle at the last ledger entry, and the membrane work accumulated so far."""
+FIRST_OPTIONAL = 19
+
+TOOL_FIELDS = 4
+"""Per tool: friction force (3) and friction heat times tangential stiffness, accumulated [N^2]."""
+
+LEAD = 16
+"""Unused numbers before each scratch row, so that index i - 1 exists and rows stay aligned."""
+
+WIDTHS = (16, 32, 48, 80, 112, 144, 208, 272, 400, 528, 784, 1040, 1296, 1552, 2064, 3088, 4112, 8208)
+"""Row strides that are compiled; no power of two, so that fields do not compete for the same cache sets."""
+
+
+def stride_for(columns: int) -> int:
+    """Smallest compiled stride that holds a row and the padding that vector loops run into."""
+    needed = columns + 8
+    for width in WIDTHS:
+        if width >= needed:
+            return width
+    return -(-needed // 4096) * 4096 + 16
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Constants of one compiled loop. Every member is an integer, so that the compiled code can be cached by value.
+
+    Attributes
+    ----------
+    stride
+        Numbers per field of a row.
+    tools
+        Rigid tools.
+    half_cells
+        1 where the blank has half cells.
+    driven
+        1 where some crossings follow prescribed motions (grips).
+    warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces
+        Packing of the laws.
+    """
+
+    stride: int
+    tools: int
+    half_cells: int
+    driven: int
+    warp_degree: int
+    warp_pieces: int
+    weft_degree: int
+    weft_pieces: int
+    shear_degree: int
+    shear_pieces: int
+
+    @property
+    def edge_weight(self) -> int:
+        """First of the two fields with the weights of the edges of half cells."""
+        return FIRST_OPTIONAL
+
+    @property
+    def force(self) -> int:
+        """First of the three fields with the internal force, kept where crossings are driven."""
+        return FIRST_OPTIONAL + 2 * self.half_cells
+
+    @property
+    def tool(self) -> int:
+        """First field of the first tool."""
+        return self.force + 3 * self.driven
+
+    @property
+    def fields(self) -> int:
+        """Fields per row."""
+        return self.tool + TOOL_FIELDS * self.tools
+
+    @property
+    def row(self) -> int:
+        """Numbers per row."""
+        return self.fields * self.stride
+
+    @property
+    def block(self) -> int:
+        """Numbers of a scratch block of three components."""
+        return 3 * self.stride + 2 * LEAD

@@ -1,0 +1,236 @@
+"""The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
+
+Order within a sweep, for each row: warp connectors, cells above, weft connectors above, sum on the crossings, contact, update. A
+row is updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its neighbours' edge
+rows (halos), refreshed before each step, so no thread reads what another writes, and every row is computed by the same operations
+in the same order whatever the number of bands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+
+from weftform.mechanics.compiled import FASTMATH
+from weftform.mechanics.motion import motion_value
+from weftform.solver import layout as at
+from weftform.solver.layout import Layout
+from weftform.solver.rows import (
+    LEAD,
+    cell_row,
+    contact_row,
+    gather_row,
+    keep_row,
+    update_row,
+    warp_row,
+    weft_row,
+)
+from weftform.solver.subnormals import flush_subnormals, restore_subnormals
+
+# columns of the table of rigid tools
+T_SHAPE = 0
+T_HALF_THICKNESS = 5
+T_STIFFNESS = 6
+T_FRICTION = 7
+T_TANGENTIAL = 8
+T_MOTION = 9
+T_MASS = 10
+T_DAMPING = 11
+TOOL_COLUMNS = 12
+
+# columns of the state of rigid tools
+P_Z = 0
+P_VELOCITY = 1
+P_REACTION = 2
+P_LAST_Z = 3
+P_LAST_REACTION = 4
+P_LAST_DRIVE = 5
+P_WORK = 6
+P_DAMPED = 7
+POSE_COLUMNS = 8
+
+# the clock: what changes from step to step
+C_TIME = 0
+C_STEP = 1
+C_LAST_STEP = 2
+C_STEPS_DONE = 3
+C_DRIVE_WORK = 4
+CLOCK_COLUMNS = 5
+
+IDENTITY, COSINE, SINE = 0, 1, 2
+"""How a motion enters a direction of driven crossings: a, cos a - 1 or sin a."""
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _mode_amplitude(kind, value):
+    if kind == COSINE:
+        return np.cos(value) - 1.0
+    if kind == SINE:
+        return np.sin(value)
+    return value
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _sweep_band(
+    state, band, bands, first, last, columns, edge, node, membrane, series,
+    warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
+    tool_table, poses, touching, reactions, step, last_step, kick, keep, damping,
+    stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
+    warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
+):  # fmt: skip
+    """One step of the rows ``first`` to ``last`` (halos included) of a band."""
+    flush_subnormals()
+    count = np.uint64(columns)
+    cells = np.uint64(columns - 1)
+    for k in range(block):
+        edge[block + k] = 0.0
+        node[k] = 0.0
+    own_first = first + (1 if band > 0 else 0)
+    own_last = last - (1 if band < bands - 1 else 0)
+    for r in range(first, own_last + 1):
+        row = np.uint64(r) * np.uint64(row_length)
+        if r >= own_first:
+            warp_row(state, row, count, edge, node, stride, warp_inverse, warp_degree, warp_pieces, warp_law)
+        if r < last:
+            cell_row(
+                state, row, cells, edge, stride, row_length, half_cells, edge_weight, membrane,
+                shear_degree, shear_pieces, shear_law, series,
+            )  # fmt: skip
+            weft_row(
+                state, row, count, edge, node, stride, row_length, half_cells, weft_inverse,
+                weft_degree, weft_pieces, weft_law,
+            )  # fmt: skip
+        else:
+            for k in range(block):
+                node[k] = 0.0
+        if r < own_first:
+            continue
+        gather_row(count, edge, node, stride)
+        if driven:
+            keep_row(state, row, count, node, stride, force_field)
+        for k in range(tools):
+            if touching[k, r]:
+                reactions[k, r] = contact_row(
+                    state, row, count, node, stride, first_tool + 4 * k, tool_table[k],
+                    poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
+                )  # fmt: skip
+            else:
+                reactions[k, r] = 0.0
+        update_row(state, row, count, node, stride, step, kick, keep, damping)
+
+
+@cache
+def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
+    """The compiled time loop for a layout; kernels are cached on disk per user (see :mod:`weftform.solver.kernel_cache`)."""
+    stride = layout.stride
+    row_length = layout.row
+    block = layout.block
+    tools = layout.tools
+    half_cells = layout.half_cells
+    driven = layout.driven
+    edge_weight, force_field, first_tool = layout.edge_weight, layout.force, layout.tool
+    warp_degree, warp_pieces = layout.warp_degree, layout.warp_pieces
+    weft_degree, weft_pieces = layout.weft_degree, layout.weft_pieces
+    shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
+
+    def advance(
+        state, bounds, halo_to, halo_from, columns, edge, node, membrane, series,
+        warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
+        tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
+        driven_nodes, driven_state, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha, density,
+    ):  # fmt: skip
+        """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
+        environment = flush_subnormals()
+        bands = bounds.shape[0]
+        rows = touching.shape[1]
+        done = 0
+        amplitude = np.zeros(mode_motion.shape[0])
+        step = clock[C_STEP]
+        last_step = clock[C_LAST_STEP]
+        while done < steps and clock[C_TIME] < stop:
+            time = clock[C_TIME]
+            mean_step = 0.5 * (step + last_step)
+            keep = (1.0 - 0.5 * alpha * mean_step) / (1.0 + 0.5 * alpha * mean_step)
+            kick = mean_step / (1.0 + 0.5 * alpha * mean_step)
+            if driven:
+                for m in range(mode_motion.shape[0]):
+                    k = mode_motion[m]
+                    value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time + step)
+                    amplitude[m] = _mode_amplitude(mode_kind[m], value)
+                share = 1.0 / (step * keep)
+                for n in range(driven_nodes.shape[0]):
+                    for c in range(3):
+                        target = driven_state[n, c]
+                        for m in range(mode_motion.shape[0]):
+                            target += amplitude[m] * driven_modes[m, n, c]
+                        place = driven_nodes[n] + c * stride
+                        state[place + at.VELOCITY * stride] = (target - state[place]) * share
+            for h in range(halo_to.shape[0]):
+                source = halo_from[h] * row_length
+                target_row = halo_to[h] * row_length
+                for k in range(3 * stride):
+                    state[target_row + k] = state[source + k]
+            for band in numba.prange(bands):
+                _sweep_band(
+                    state, band, bands, bounds[band, 0], bounds[band, 1], columns, edge[band], node[band], membrane,
+                    series, warp_law, weft_law, shear_law, warp_inverse, weft_inverse, tool_table, poses, touching,
+                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * mean_step,
+                    stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
+                    warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
+                )  # fmt: skip
+            for k in range(tools):
+                total = 0.0
+                for r in range(rows):
+                    total += reactions[k, r]
+                motion = int(tool_table[k, T_MOTION])
+                z = poses[k, P_Z]
+                travelled = z - poses[k, P_LAST_Z]
+                mass = tool_table[k, T_MASS]
+                poses[k, P_LAST_REACTION] = poses[k, P_REACTION]
+                poses[k, P_REACTION] = total
+                drive = total
+                if mass > 0.0:
+                    drive = motion_value(
+                        motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time
+                    )
+                    rate = tool_table[k, T_DAMPING]
+                    old = poses[k, P_VELOCITY]
+                    new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
+                        1.0 + 0.5 * rate * mean_step
+                    )
+                    poses[k, P_DAMPED] += 0.25 * rate * mass * (old + new) * (old + new) * mean_step
+                    poses[k, P_VELOCITY] = new
+                    ahead = z + step * new
+                elif motion >= 0:
+                    ahead = motion_value(
+                        motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time + step
+                    )
+                else:
+                    ahead = z
+                poses[k, P_WORK] += 0.5 * (drive + poses[k, P_LAST_DRIVE]) * travelled
+                poses[k, P_LAST_DRIVE] = drive
+                poses[k, P_LAST_Z] = z
+                poses[k, P_Z] = ahead
+            if driven:
+                # trapezium of the force over the way: half of this step's way with this force, half with the next one's
+                work = 0.0
+                for n in range(driven_nodes.shape[0]):
+                    place = driven_nodes[n]
+                    for c in range(3):
+                        now = state[place + (at.VELOCITY + c) * stride] * step
+                        work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
+                        driven_state[n, 3 + c] = now
+                clock[C_DRIVE_WORK] += work
+            clock[C_TIME] = time + step
+            last_step = step
+            done += 1
+        clock[C_LAST_STEP] = last_step
+        clock[C_STEPS_DONE] += done
+        restore_subnormals(environment)
+        return done
+
+    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(advance)

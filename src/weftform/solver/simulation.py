@@ -1,0 +1,568 @@
+"""A simulation: state, time loop, stable step and energy ledger. Knows no files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weftform.blank import YarnGrid
+from weftform.errors import UnstableRun
+from weftform.fabric import Fabric
+from weftform.fabric.piecewise import PiecewiseLaw, pack_law, pack_shear
+from weftform.mechanics import stable_step as stability
+from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
+from weftform.solver import layout as at
+from weftform.solver import energies, loop, survey
+from weftform.solver.layout import Layout, stride_for
+from weftform.tooling import RigidTool
+
+Floats = NDArray[np.float64]
+
+SURVEY_EVERY = 64
+"""Steps between surveys of the state (stiffness, contact search)."""
+LEDGER_EVERY = 4
+"""Surveys between entries of the energy ledger."""
+CONTACT_MARGIN = 0.25
+"""Share of the thickness within which a row always counts as touching."""
+LOG_RANGE = 2.6
+"""Largest stretch (and inverse of the smallest) for which the series of the logarithm is fitted."""
+LOG_TERMS = 14
+"""Terms of that series: error below 1e-10 over the range."""
+HOLDER_PERIODS = 20.0
+"""Automatic mass of a force-driven tool: one radian of its bounce on the contact takes this many initial steps."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A value that passes through knots in time, soft at each (:func:`weftform.mechanics.motion.motion_value`)."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Crossings that follow prescribed motions.
+
+    Attributes
+    ----------
+    nodes
+        Flat indices (row * columns + column), shape [nodes].
+    modes
+        Displacement [mm] per unit of each amplitude, shape [modes, nodes, 3].
+    motions
+        Index of the motion behind each mode, shape [modes].
+    kinds
+        How it enters: ``loop.IDENTITY``, ``loop.COSINE`` or ``loop.SINE``, shape [modes].
+    """
+
+    nodes: NDArray[np.int64]
+    modes: Floats
+    motions: tuple[int, ...]
+    kinds: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numerical settings; see ``study.schema.SolverTable``."""
+
+    ramp: float = 0.2
+    mass_scaling: float = 1.0
+    damping: float = 0.0
+    hourglass: float = 0.01
+    safety: float = 0.9
+    most_steps: int = 20_000_000
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything a simulation needs."""
+
+    grid: YarnGrid
+    fabric: Fabric
+    tools: tuple[RigidTool, ...] = ()
+    motions: tuple[Motion, ...] = ()
+    stroke: int = -1
+    """Motion of the tools that make the stroke."""
+    holding: int = -1
+    """Motion (0 to 1) that scales the forces of the tools that are pushed."""
+    driven: Driven | None = None
+    settings: Settings = field(default_factory=Settings)
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Energies [mJ] of the modelled part at one instant."""
+
+    kinetic: float
+    connectors: float
+    membrane: float
+    hourglass: float
+    contact: float
+    friction: float
+    damping: float
+    work: float
+
+    @property
+    def internal(self) -> float:
+        """Energy stored in the fabric and its contacts."""
+        return self.connectors + self.membrane + self.hourglass
+
+    @property
+    def imbalance(self) -> float:
+        """Work done minus all that it turned into [mJ]."""
+        return self.work - self.kinetic - self.internal - self.contact - self.friction - self.damping
+
+
+class Simulation:
+    """Explicit central differences on the yarn grid.
+
+    Parameters
+    ----------
+    problem
+        What to simulate.
+    threads
+        Bands of rows computed in parallel; the result does not depend on it.
+    """
+
+    def __init__(self, problem: Problem, threads: int = 1) -> None:
+        grid, fabric = problem.grid, problem.fabric
+        self.problem = problem
+        self.rows, self.columns = grid.shape
+        self.bands = max(1, min(threads, self.rows // 4))
+        self.density = fabric.areal_density * problem.settings.mass_scaling
+        warp = pack_law(fabric.warp.line_law(grid.weft_pitch), 1.5)
+        weft = pack_law(fabric.weft.line_law(grid.warp_pitch), 1.5)
+        shear = pack_shear(fabric.shear.stress)
+        self._packed = warp, weft, shear
+        self._laws = (
+            _law_arguments(warp, fabric.warp.slack_ratio),
+            _law_arguments(weft, fabric.weft.slack_ratio),
+            _law_arguments(shear, 0.0),
+        )
+        self._series = _log_series()
+        # polynomials go to the time loop as tuples: values, not memory, so they cannot overlap what the loop writes
+        self._loop_laws = tuple(
+            ((tuple(law[0]) if packed.pieces == 1 else law[0]), *law[1:])
+            for law, packed in zip(self._laws, (warp, weft, shear), strict=True)
+        )
+        self._loop_series = tuple(self._series)
+        self.layout = Layout(
+            stride=stride_for(self.columns),
+            tools=len(problem.tools),
+            half_cells=int(grid.has_half_cells),
+            driven=int(problem.driven is not None),
+            warp_degree=warp.degree,
+            warp_pieces=warp.pieces,
+            weft_degree=weft.degree,
+            weft_pieces=weft.pieces,
+            shear_degree=shear.degree,
+            shear_pieces=shear.pieces,
+        )
+        card = fabric.card.membrane
+        stabilise = problem.settings.hourglass * 0.5 * (card.warp_modulus_MPa + card.weft_modulus_MPa)
+        self._membrane = np.array(
+            [
+                1.0 / grid.warp_pitch,
+                1.0 / grid.weft_pitch,
+                card.warp_modulus_MPa,
+                card.weft_modulus_MPa,
+                stabilise / grid.cell_area,
+            ]
+        )
+        self._lay_out_bands()
+        self._fill_state()
+        self._place_tools()
+        self._drive_crossings()
+        self.clock = np.zeros(loop.CLOCK_COLUMNS)
+        self._surveys = 0
+        self.last = self._survey()
+        self._enter_ledger()
+        self._choose_step()
+        self._choose_holder_mass()
+        self._loop = loop.compile_loop(self.layout, self.bands > 1)
+
+    # -- setting up ------------------------------------------------------------------------------------------------
+
+    def _lay_out_bands(self) -> None:
+        edges = np.linspace(0, self.rows, self.bands + 1).round().astype(int)
+        self._row_index = np.zeros(self.rows, np.int64)
+        self._bounds = np.zeros((self.bands, 2), np.int64)
+        local = 0
+        halos = []
+        for band in range(self.bands):
+            first = edges[band] - (1 if band > 0 else 0)
+            last = edges[band + 1] - 1 + (1 if band < self.bands - 1 else 0)
+            self._bounds[band] = local, local + last - first
+            for row in range(first, last + 1):
+                if edges[band] <= row < edges[band + 1]:
+                    self._row_index[row] = local
+                else:
+                    halos.append((local, row))
+                local += 1
+        self._local_rows = local
+        self._halo_to = np.array([to for to, _ in halos], np.int64)
+        self._halo_row = np.array([row for _, row in halos], np.int64)
+        self._halo_from = self._row_index[self._halo_row] if halos else np.zeros(0, np.int64)
+
+    def _fill_state(self) -> None:
+        grid, fabric, layout = self.problem.grid, self.problem.fabric, self.layout
+        rows, columns = self.rows, self.columns
+        self._state = np.zeros((self._local_rows, layout.fields, layout.stride))
+        fields = np.zeros((rows, layout.fields, layout.stride))
+        # padding and crossings outside the blank hold the flat grid, so that no vector loop divides by zero
+        u = (np.arange(layout.stride) - grid.centre[0]) * grid.warp_pitch
+        v = (np.arange(rows) - grid.centre[1]) * grid.weft_pitch
+        plan = grid.plan(np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1))
+        fields[:, at.POSITION] = plan[..., 0]
+        fields[:, at.POSITION + 1] = plan[..., 1]
+        fields[:, at.POSITION : at.POSITION + 2, :columns][
+            np.broadcast_to(grid.on_plane.transpose(0, 2, 1), (rows, 2, columns))
+        ] = 0.0
+        inertia = self.inertia_area
+        with np.errstate(divide="ignore"):
+            inverse = np.where(grid.active, 1.0 / (self.density * inertia), 0.0)
+        for c in range(3):
+            fields[:, at.INVERSE_MASS + c, :columns] = inverse
+        for c in range(2):
+            fields[:, at.INVERSE_MASS + c, :columns][grid.on_plane[..., c]] = 0.0
+        fields[:, at.AREA, :columns] = grid.node_area
+        fields[:, at.INERTIA, :columns] = inertia
+        fields[:, at.WARP_LINE, : columns - 1] = grid.warp_lines
+        fields[:-1, at.WEFT_LINE, :columns] = grid.weft_lines
+        fields[:-1, at.VOLUME, : columns - 1] = grid.cell_share * grid.cell_area * fabric.thickness
+        if layout.half_cells:
+            lower, left = grid.edge_weights
+            fields[:, layout.edge_weight : layout.edge_weight + 2] = 0.5
+            fields[:-1, layout.edge_weight, : columns - 1] = lower
+            fields[:-1, layout.edge_weight + 1, : columns - 1] = left
+        self._state[self._row_index] = fields
+        if self._halo_to.size:
+            self._state[self._halo_to] = fields[self._halo_row]
+        self._edge = np.zeros((self.bands, 4 * layout.block))
+        self._node = np.zeros((self.bands, 3 * layout.block))
+
+    @property
+    def inertia_area(self) -> Floats:
+        """Area whose mass each crossing carries [mm2], shape [rows, columns].
+
+        A yarn on a free edge is a whole yarn (Eq. 11 counts n + 1 lines) but only half a cell of fabric belongs to it. It is given
+        the mass of a whole yarn, or the one edge would set the stable step of the blank.
+        """
+        grid = self.problem.grid
+        warp = np.zeros(grid.shape)
+        warp[:, 1:] += grid.warp_lines
+        warp[:, :-1] += grid.warp_lines
+        weft = np.zeros(grid.shape)
+        weft[1:] += grid.weft_lines
+        weft[:-1] += grid.weft_lines
+        return np.where(
+            grid.active, np.maximum(grid.node_area, 0.5 * grid.cell_area * np.maximum(warp, weft)), 0.0
+        )
+
+    def _place_tools(self) -> None:
+        tools = self.problem.tools
+        half = 0.5 * self.problem.fabric.thickness
+        self._tool_table = np.zeros((len(tools), loop.TOOL_COLUMNS))
+        self._poses = np.zeros((len(tools), loop.POSE_COLUMNS))
+        for row, tool in zip(self._tool_table, tools, strict=True):
+            row[:5] = tool.side_s, tool.s0, tool.side_z, tool.z0, tool.radius
+            row[5:9] = half, tool.stiffness, tool.friction, tool.tangential_ratio
+            row[loop.T_MOTION] = self.problem.stroke if tool.motion == "stroke" else -1
+        motions = list(self.problem.motions)
+        for row, tool in zip(self._tool_table, tools, strict=True):
+            if tool.motion == "force":
+                share = motions[self.problem.holding]
+                force = tool.up * tool.force / self.problem.grid.copies
+                row[loop.T_MOTION] = len(motions)
+                motions.append(Motion(share.times, tuple(force * v for v in share.values)))
+                row[loop.T_MASS] = tool.mass / self.problem.grid.copies if tool.mass else np.nan
+            elif tool.motion == "stroke" and tool.up < 0:
+                stroke = motions[self.problem.stroke]
+                row[loop.T_MOTION] = len(motions)
+                motions.append(Motion(stroke.times, tuple(-v for v in stroke.values)))
+        knots = max([len(m.times) for m in motions], default=1)
+        self._motion_times = np.zeros((max(len(motions), 1), knots))
+        self._motion_values = np.zeros_like(self._motion_times)
+        self._motion_knots = np.ones(max(len(motions), 1), np.int64)
+        for k, motion in enumerate(motions):
+            n = len(motion.times)
+            self._motion_times[k, :n] = motion.times
+            self._motion_values[k, :n] = motion.values
+            self._motion_knots[k] = n
+        self._touching = np.ones((len(tools), self._local_rows), np.bool_)
+        self._reactions = np.zeros((len(tools), self._local_rows))
+
+    def _drive_crossings(self) -> None:
+        driven = self.problem.driven
+        layout = self.layout
+        if driven is None:
+            self._driven_nodes = np.zeros(0, np.int64)
+            self._driven_state = np.zeros((0, 6))
+            self._driven_modes = np.zeros((0, 0, 3))
+            self._mode_motion = np.zeros(0, np.int64)
+            self._mode_kind = np.zeros(0, np.int64)
+            return
+        row, column = np.divmod(driven.nodes, self.columns)
+        local = self._row_index[row]
+        self._driven_nodes = local * layout.row + column
+        self._driven_state = np.zeros((len(driven.nodes), 6))
+        for c in range(3):
+            self._driven_state[:, c] = self._state[local, at.POSITION + c, column]
+            self._state[local, at.INVERSE_MASS + c, column] = 0.0
+        self._driven_modes = np.ascontiguousarray(driven.modes)
+        self._mode_motion = np.asarray(driven.motions, np.int64)
+        self._mode_kind = np.asarray(driven.kinds, np.int64)
+
+    def _choose_step(self) -> None:
+        s, grid, membrane = self.last, self.problem.grid, self._membrane
+        warp, weft, shear = self._packed
+        # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the truth.
+        k_warp = _largest_slope(warp, s[survey.WARP_STRAIN]) / grid.warp_pitch
+        k_weft = _largest_slope(weft, s[survey.WEFT_STRAIN]) / grid.weft_pitch
+        t = s[survey.HALF_TANGENT]
+        sine = 2.0 * t / (1.0 + t * t)
+        stress_slope = _largest_value(shear, t) + t * _largest_slope(shear, t)
+        modulus = 0.5 * stress_slope * (1.0 + t * t) + t * _largest_value(shear, t)
+        aspect = grid.cell_area / min(grid.warp_pitch, grid.weft_pitch) ** 2
+        cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
+        crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
+        contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
+        self.clock[loop.C_STEP] = self.problem.settings.safety * stability.stable_step(
+            crossing, contact, self.density * grid.cell_area
+        )
+
+    def _choose_holder_mass(self) -> None:
+        area = float(self.problem.grid.node_area.sum())
+        for row in self._tool_table:
+            if row[loop.T_MASS] == 0.0:
+                continue
+            spring = row[loop.T_STIFFNESS] * area
+            if np.isnan(row[loop.T_MASS]):
+                row[loop.T_MASS] = spring * (HOLDER_PERIODS * self.clock[loop.C_STEP]) ** 2
+            # half of critical damping of the bounce on the contact
+            row[loop.T_DAMPING] = math.sqrt(spring / row[loop.T_MASS])
+
+    # -- running ---------------------------------------------------------------------------------------------------
+
+    def advance_to(self, stop: float, watch: Callable[[Simulation], None] | None = None) -> None:
+        """March to the time ``stop`` [s].
+
+        Parameters
+        ----------
+        watch
+            Called after each batch of steps; may raise to end the run.
+
+        Raises
+        ------
+        UnstableRun
+            A crossing left all bounds, or the steps are used up.
+        """
+        settings = self.problem.settings
+        while self.time < stop * (1.0 - 1e-12):
+            if self.steps >= settings.most_steps:
+                raise UnstableRun(
+                    f"stopped after {self.steps} steps at t = {self.time:.4g} s, before the end",
+                    hint="raise solver.most_steps, or use mass scaling or a shorter duration",
+                )
+            made = self._advance(SURVEY_EVERY, stop)
+            self._surveys += 1
+            self.last = self._survey()
+            if not self.last[survey.FINITE]:
+                self._report_blow_up()
+            if self._surveys % LEDGER_EVERY == 0:
+                self._enter_ledger()
+            self._choose_step()
+            if watch is not None:
+                watch(self)
+            if made == 0:
+                break
+
+    def _advance(self, steps: int, stop: float) -> int:
+        settings = self.problem.settings
+        if self.bands > 1:
+            import numba
+
+            numba.set_num_threads(self.bands)
+        return int(
+            self._loop(
+                self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self.columns,
+                self._edge, self._node, tuple(self._membrane), self._loop_series, *self._loop_laws,
+                self._membrane[0], self._membrane[1],
+                self._tool_table, self._poses, self._touching, self._reactions,
+                self._motion_times, self._motion_values, self._motion_knots, settings.ramp,
+                self._driven_nodes, self._driven_state, self._driven_modes, self._mode_motion, self._mode_kind,
+                self.clock, steps, stop, settings.damping, self.density,
+            )
+        )  # fmt: skip
+
+    def _survey(self) -> Floats:
+        layout, grid = self.layout, self.problem.grid
+        found: Floats = survey.survey(
+            self._state.reshape(-1), self._row_index, self.columns, layout.stride, layout.fields,
+            layout.half_cells, layout.edge_weight, layout.tools, grid.warp_pitch, grid.weft_pitch,
+            self._tool_table, self._poses, self._touching, SURVEY_EVERY * self.clock[loop.C_STEP], SURVEY_EVERY,
+            CONTACT_MARGIN * self.problem.fabric.thickness,
+        )  # fmt: skip
+        return found
+
+    def _enter_ledger(self) -> Floats:
+        layout, grid = self.layout, self.problem.grid
+        entry: Floats = energies.enter_ledger(
+            self._state.reshape(-1), self._row_index, self.columns, layout.stride, layout.fields,
+            layout.half_cells, layout.edge_weight, layout.tool, layout.tools, self.density,
+            self._membrane, self._series, *self._laws,
+            (layout.warp_degree, layout.warp_pieces, layout.weft_degree, layout.weft_pieces,
+             layout.shear_degree, layout.shear_pieces),
+            grid.warp_pitch, grid.weft_pitch, self._tool_table, self._poses,
+        )  # fmt: skip
+        return entry
+
+    def _report_blow_up(self) -> None:
+        row, column = int(self.last[survey.WORST_ROW]), int(self.last[survey.WORST_COLUMN])
+        u, v = self.problem.grid.material[row, column]
+        raise UnstableRun(
+            f"the simulation blew up at step {self.steps}, t = {self.time:.4g} s, near the crossing {u:.1f} mm along warp and "
+            f"{v:.1f} mm along weft from the centre",
+            hint="lower solver.safety, lengthen loading.duration_s, or soften the contact (contact.*.stiffness_N_per_mm3)",
+        )
+
+    # -- looking ---------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.clock[loop.C_TIME])
+
+    @property
+    def step(self) -> float:
+        """Current time step [s]."""
+        return float(self.clock[loop.C_STEP])
+
+    @property
+    def steps(self) -> int:
+        """Steps made."""
+        return int(self.clock[loop.C_STEPS_DONE])
+
+    def _grid_field(self, first: int) -> Floats:
+        rows = self._state[self._row_index]
+        return np.ascontiguousarray(rows[:, first : first + 3, : self.columns].transpose(0, 2, 1))
+
+    @property
+    def positions(self) -> Floats:
+        """Positions of the crossings [mm], shape [rows, columns, 3]."""
+        return self._grid_field(at.POSITION)
+
+    @property
+    def velocities(self) -> Floats:
+        """Velocities of the crossings half a step ago [mm/s], shape [rows, columns, 3]."""
+        return self._grid_field(at.VELOCITY)
+
+    @velocities.setter
+    def velocities(self, values: Floats) -> None:
+        for c in range(3):
+            self._state[self._row_index, at.VELOCITY + c, : self.columns] = values[..., c]
+
+    @property
+    def masses(self) -> Floats:
+        """Mass of each crossing [tonne], shape [rows, columns]."""
+        return self.density * self.inertia_area
+
+    @property
+    def driven_forces(self) -> Floats:
+        """Force that moves each driven crossing, as of the last step [N], shape [nodes, 3]."""
+        flat = self._state.reshape(-1)
+        first = self.layout.force * self.layout.stride
+        return -np.stack(
+            [flat[self._driven_nodes + first + c * self.layout.stride] for c in range(3)], axis=-1
+        )
+
+    def tool_position(self, index: int) -> float:
+        """Way of a tool along z since the start [mm]."""
+        return float(self._poses[index, loop.P_Z])
+
+    def tool_reaction(self, index: int) -> float:
+        """Axial force of a tool on the modelled part, upwards positive [N]."""
+        return float(self._poses[index, loop.P_REACTION])
+
+    @property
+    def contact_forces(self) -> Floats:
+        """Force of all tools on each crossing [N], shape [rows, columns, 3]."""
+        from weftform.mechanics.contact import rounded_edge
+
+        total = np.zeros((self.rows, self.columns, 3))
+        rows = self._state[self._row_index]
+        x, y, z = (rows[:, at.POSITION + c, : self.columns] for c in range(3))
+        area = rows[:, at.AREA, : self.columns]
+        away = np.hypot(x, y)
+        for k, table in enumerate(self._tool_table):
+            distance, normal_s, normal_z = _edge_field(rounded_edge, away, z - self._poses[k, 0], table)
+            press = table[6] * area * np.maximum(table[5] - distance, 0.0)
+            radial = press * normal_s / np.maximum(away, 1e-12)
+            friction = self.layout.tool + at.TOOL_FIELDS * k
+            total[..., 0] += radial * x + rows[:, friction, : self.columns]
+            total[..., 1] += radial * y + rows[:, friction + 1, : self.columns]
+            total[..., 2] += press * normal_z + rows[:, friction + 2, : self.columns]
+        return total
+
+    @property
+    def penetration(self) -> float:
+        """Largest penetration at the last survey [mm]."""
+        return float(self.last[survey.PENETRATION])
+
+    def ledger(self) -> Ledger:
+        """Energies now [mJ]."""
+        entry = self._enter_ledger()
+        tools = self._poses
+        mass = self._tool_table[:, loop.T_MASS]
+        return Ledger(
+            kinetic=float(entry[energies.KINETIC] + 0.5 * (mass * tools[:, loop.P_VELOCITY] ** 2).sum()),
+            connectors=float(entry[energies.CONNECTORS]),
+            membrane=float(entry[energies.MEMBRANE]),
+            hourglass=float(entry[energies.HOURGLASS]),
+            contact=float(entry[energies.CONTACT]),
+            friction=float(entry[energies.FRICTION]),
+            damping=float(entry[energies.DAMPED] + tools[:, loop.P_DAMPED].sum()),
+            work=float(tools[:, loop.P_WORK].sum() + self.clock[loop.C_DRIVE_WORK]),
+        )
+
+
+def _edge_field(
+    rounded_edge: Callable[..., tuple[float, float, float]], away: Floats, z: Floats, table: Floats
+) -> tuple[Floats, Floats, Floats]:
+    return np.vectorize(lambda s, h: rounded_edge(s, h, *table[:5]), otypes=[float, float, float])(away, z)
+
+
+def _law_arguments(law: PiecewiseLaw, slack_ratio: float) -> tuple[Floats, Floats, float, float, float]:
+    initial = float(law.coefficients[law.degree - 1]) if law.degree else 0.0
+    return law.coefficients, law.integrals, law.width, law.end_slope, slack_ratio * initial
+
+
+def _largest_slope(law: PiecewiseLaw, x: float) -> float:
+    """Largest derivative of a packed law on 0..x, sampled."""
+    samples = np.linspace(0.0, max(x, 0.0), 17)
+    return max(
+        piecewise_slope(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s) for s in samples
+    )
+
+
+def _largest_value(law: PiecewiseLaw, x: float) -> float:
+    """Largest value of a packed law on 0..x, sampled."""
+    samples = np.linspace(0.0, max(x, 0.0), 17)
+    return max(
+        piecewise_value(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s) for s in samples
+    )
+
+
+def _log_series() -> Floats:
+    """Coefficients of ``ln(l) / y`` in powers of ``y^2``, ``y = (l^2 - 1)/(l^2 + 1)``, highest power first."""
+    largest = (LOG_RANGE**2 - 1.0) / (LOG_RANGE**2 + 1.0)
+    nodes = 0.5 * largest**2 * (1.0 - np.cos(np.pi * (np.arange(200) + 0.5) / 200))
+    ratio = np.arctanh(np.sqrt(nodes)) / np.sqrt(nodes)
+    fit = np.polynomial.Chebyshev.fit(nodes, ratio, LOG_TERMS - 1, domain=[0.0, largest**2])
+    powers = fit.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef
+    return np.ascontiguousarray(powers[::-1])
