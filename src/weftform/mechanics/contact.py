@@ -37,7 +37,9 @@ def rounded_edge(
 
 
 @scalar
-def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
+def coulomb(
+    trial_x: float, trial_y: float, trial_z: float, limit: float
+) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
     Returns the three components and (excess cut off) x (force kept) [N^2]: divided by the tangential stiffness it is the heat.

@@ -159,7 +159,9 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
             if driven:
                 for m in range(mode_motion.shape[0]):
                     k = mode_motion[m]
-                    value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time + step)
+                    value = motion_value(
+                        motion_times[k], motion_values[k], motion_knots[k], ramp, time + step
+                    )
                     amplitude[m] = _mode_amplitude(mode_kind[m], value)
                 share = 1.0 / (step * keep)
                 for n in range(driven_nodes.shape[0]):
@@ -222,7 +224,9 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                     place = driven_nodes[n]
                     for c in range(3):
                         now = state[place + (at.VELOCITY + c) * stride] * step
-                        work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
+                        work -= (
+                            state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
+                        )
                         driven_state[n, 3 + c] = now
                 clock[C_DRIVE_WORK] += work
             clock[C_TIME] = time + step
@@ -233,4 +237,6 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         restore_subnormals(environment)
         return done
 
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(advance)
+    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(
+        advance
+    )

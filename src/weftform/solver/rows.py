@@ -61,7 +61,21 @@ def warp_row(state, row, count, edge, node, stride, inverse_length, degree, piec
 
 
 @row_loop
-def cell_row(state, row, count, edge, stride, row_length, half_cells, edge_weight, membrane, degree, pieces, law, series):
+def cell_row(
+    state,
+    row,
+    count,
+    edge,
+    stride,
+    row_length,
+    half_cells,
+    edge_weight,
+    membrane,
+    degree,
+    pieces,
+    law,
+    series,
+):
     """Membrane of the cells between a row and the next: forces on their four edges.
 
     ``membrane`` = (1 / warp pitch, 1 / weft pitch, E warp, E weft, hourglass stiffness). The force conjugate to ``g1`` is
@@ -160,7 +174,9 @@ def cell_row(state, row, count, edge, stride, row_length, half_cells, edge_weigh
 
 
 @row_loop
-def weft_row(state, row, count, edge, node, stride, row_length, half_cells, inverse_length, degree, pieces, law):
+def weft_row(
+    state, row, count, edge, node, stride, row_length, half_cells, inverse_length, degree, pieces, law
+):
     """Weft connectors between a row and the next, plus the share of the cells on both sides."""
     s = np.uint64(stride)
     step = np.uint64(row_length)
@@ -233,7 +249,9 @@ def contact_row(state, row, count, node, stride, field, tool, tool_z, tool_step,
         px = state[x + i]
         py = state[y + i]
         away = math.sqrt(px * px + py * py)
-        distance, normal_s, normal_z = rounded_edge(away, state[z + i] - tool_z, side_s, s0, side_z, z0, radius)
+        distance, normal_s, normal_z = rounded_edge(
+            away, state[z + i] - tool_z, side_s, s0, side_z, z0, radius
+        )
         k = stiffness * state[area + i]
         press = k * max(half_thickness - distance, 0.0)
         radial = normal_s / max(away, SMALL)

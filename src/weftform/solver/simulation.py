@@ -329,7 +329,11 @@ class Simulation:
         stress_slope = _largest_value(shear, t) + t * _largest_slope(shear, t)
         modulus = 0.5 * stress_slope * (1.0 + t * t) + t * _largest_value(shear, t)
         aspect = grid.cell_area / min(grid.warp_pitch, grid.weft_pitch) ** 2
-        cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
+        cell = (
+            self.problem.fabric.thickness
+            * aspect
+            * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
+        )
         crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
         contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
         self.clock[loop.C_STEP] = self.problem.settings.safety * stability.stable_step(
@@ -546,7 +550,8 @@ def _largest_slope(law: PiecewiseLaw, x: float) -> float:
     """Largest derivative of a packed law on 0..x, sampled."""
     samples = np.linspace(0.0, max(x, 0.0), 17)
     return max(
-        piecewise_slope(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s) for s in samples
+        piecewise_slope(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s)
+        for s in samples
     )
 
 
@@ -554,7 +559,8 @@ def _largest_value(law: PiecewiseLaw, x: float) -> float:
     """Largest value of a packed law on 0..x, sampled."""
     samples = np.linspace(0.0, max(x, 0.0), 17)
     return max(
-        piecewise_value(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s) for s in samples
+        piecewise_value(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s)
+        for s in samples
     )
 
 

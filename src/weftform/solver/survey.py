@@ -143,7 +143,9 @@ def survey(
             for c in range(3):
                 p = c * stride
                 g1 = low * (state[n + 1 + p] - state[n + p]) + (1.0 - low) * (state[u + 1 + p] - state[u + p])
-                g2 = left * (state[u + p] - state[n + p]) + (1.0 - left) * (state[u + 1 + p] - state[n + 1 + p])
+                g2 = left * (state[u + p] - state[n + p]) + (1.0 - left) * (
+                    state[u + 1 + p] - state[n + 1 + p]
+                )
                 g11 += g1 * g1
                 g22 += g2 * g2
                 g12 += g1 * g2

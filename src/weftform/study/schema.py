@@ -142,10 +142,14 @@ class StudyModel(Declared):
     def _pairs(self) -> StudyModel:
         for name in self.contact:
             if name not in self.tools:
-                raise ValueError(f'[contact.{name}] names a tool that does not exist; the tools are {", ".join(self.tools)}')
+                raise ValueError(
+                    f"[contact.{name}] names a tool that does not exist; the tools are {', '.join(self.tools)}"
+                )
         for name in self.tools:
             if name not in self.contact:
-                raise ValueError(f"tool {name} has no [contact.{name}]; every pair is named, with its friction")
+                raise ValueError(
+                    f"tool {name} has no [contact.{name}]; every pair is named, with its friction"
+                )
         if not any(tool.motion == "stroke" for tool in self.tools.values()):
             raise ValueError('no tool moves: give one of them motion = "stroke"')
         return self

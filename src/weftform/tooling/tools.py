@@ -58,9 +58,7 @@ class RigidTool:
         return np.vstack([start, np.column_stack([edge_s, edge_z]), end])
 
 
-def hemisphere(
-    diameter: float, thickness: float, up: float
-) -> tuple[float, float, float, float, float]:
+def hemisphere(diameter: float, thickness: float, up: float) -> tuple[float, float, float, float, float]:
     """Hemisphere with its shank, tip on the fabric's surface: rounded edge on the axis."""
     return flat_punch(diameter, 0.5 * diameter, thickness, up)
 

@@ -1,0 +1,140 @@
+"""VTKHDF time series of an unstructured grid whose points move and whose cells stay (VTK file format 2.0).
+
+Written step by step: each step is on disk when :meth:`Series.append` returns, so a crash keeps what was written.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+TRIANGLE, QUAD = 5, 9
+
+
+class Series:
+    """A VTKHDF file that grows by one step at a time.
+
+    Parameters
+    ----------
+    path
+        File to create, or to open where ``resume`` is true.
+    connectivity, offsets
+        Point indices of the polygons, one after the other, and where each starts (and the last ends).
+    points
+        Number of points.
+    scalars
+        Names of numbers kept for each step beside the grid (readers of VTKHDF ignore them).
+    resume
+        Open an existing file and go on after its last step.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        connectivity: NDArray[np.int64],
+        offsets: NDArray[np.int64],
+        points: int,
+        scalars: tuple[str, ...] = (),
+        *,
+        resume: bool = False,
+    ) -> None:
+        self.points = points
+        self.cells = len(offsets) - 1
+        if resume:
+            self._file = h5py.File(path, "r+")
+            self._root = self._file["VTKHDF"]
+            return
+        self._file = h5py.File(path, "w")
+        root = self._root = self._file.create_group("VTKHDF", track_order=True)
+        root.attrs["Version"] = np.array([2, 0], np.int64)
+        root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
+        root["NumberOfPoints"] = np.array([points], np.int64)
+        root["NumberOfCells"] = np.array([self.cells], np.int64)
+        root["NumberOfConnectivityIds"] = np.array([len(connectivity)], np.int64)
+        root["Connectivity"] = connectivity.astype(np.int64)
+        root["Offsets"] = offsets.astype(np.int64)
+        root["Types"] = np.where(np.diff(offsets) == 3, TRIANGLE, QUAD).astype(np.uint8)
+        self._growing(root, "Points", 3)
+        root.create_group("PointData")
+        root.create_group("CellData")
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(0)
+        steps.create_dataset("Values", (0,), np.float64, maxshape=(None,), chunks=(64,))
+        for name in ("PartOffsets", "NumberOfParts", "PointOffsets"):
+            steps.create_dataset(name, (0,), np.int64, maxshape=(None,), chunks=(64,))
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            steps.create_dataset(name, (0, 1), np.int64, maxshape=(None, 1), chunks=(64, 1))
+        steps.create_group("PointDataOffsets")
+        steps.create_group("CellDataOffsets")
+        for name in scalars:
+            self._file.create_dataset(name, (0,), np.float64, maxshape=(None,), chunks=(64,))
+        self._file.flush()
+
+    def __enter__(self) -> Series:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @staticmethod
+    def _growing(group: Any, name: str, components: int) -> Any:
+        shape = (0,) if components == 1 else (0, components)
+        maxshape = (None,) if components == 1 else (None, components)
+        chunk = (4096,) if components == 1 else (4096, components)
+        return group.create_dataset(name, shape, np.float64, maxshape=maxshape, chunks=chunk, compression="gzip",
+                                    compression_opts=1, shuffle=True)  # fmt: skip
+
+    @property
+    def steps(self) -> int:
+        """Steps in the file."""
+        return int(self._root["Steps"].attrs["NSteps"])
+
+    def append(
+        self,
+        time: float,
+        points: Floats,
+        point_data: dict[str, Floats],
+        cell_data: dict[str, Floats],
+        **scalars: float,
+    ) -> None:
+        """Write one step: positions [points, 3] and fields with one row per point or cell."""
+        root, steps, n = self._root, self._root["Steps"], self.steps
+        _extend(root["Points"], points)
+        for name, value in scalars.items():
+            _extend(self._file[name], np.array([value]))
+        for kind, fields in (("PointData", point_data), ("CellData", cell_data)):
+            for name, values in fields.items():
+                if name not in root[kind]:
+                    self._growing(root[kind], name, 1 if values.ndim == 1 else values.shape[1])
+                    steps[f"{kind}Offsets"].create_dataset(
+                        name, (0,), np.int64, maxshape=(None,), chunks=(64,)
+                    )
+                _extend(steps[f"{kind}Offsets"][name], np.array([root[kind][name].shape[0]]))
+                _extend(root[kind][name], values)
+        _extend(steps["Values"], np.array([time]))
+        _extend(steps["PartOffsets"], np.array([0]))
+        _extend(steps["NumberOfParts"], np.array([1]))
+        _extend(steps["PointOffsets"], np.array([n * self.points]))
+        _extend(steps["CellOffsets"], np.array([[0]]))
+        _extend(steps["ConnectivityIdOffsets"], np.array([[0]]))
+        steps.attrs["NSteps"] = np.int64(n + 1)
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _extend(dataset: Any, values: NDArray[Any]) -> None:
+    start = dataset.shape[0]
+    dataset.resize(start + len(values), axis=0)
+    dataset[start:] = values

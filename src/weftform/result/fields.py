@@ -1,0 +1,211 @@
+"""Fields on the cells and crossings, computed from positions: the laws are functions of the state, so nothing else is needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weftform.blank import Cell, YarnGrid
+from weftform.fabric import Fabric
+from weftform.fabric.fabric import TensionLaw
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Fields of a blank at one instant.
+
+    Attributes
+    ----------
+    grid, fabric
+        What the positions belong to.
+    positions
+        Positions of the crossings [mm], shape [rows, columns, 3].
+    """
+
+    grid: YarnGrid
+    fabric: Fabric
+    positions: Floats
+
+    @cached_property
+    def _warp_edges(self) -> Floats:
+        return self.positions[:, 1:] - self.positions[:, :-1]
+
+    @cached_property
+    def _weft_edges(self) -> Floats:
+        return self.positions[1:] - self.positions[:-1]
+
+    @cached_property
+    def vectors(self) -> tuple[Floats, Floats]:
+        """Mean yarn vectors of the cells per initial length, shape [rows - 1, columns - 1, 3] each."""
+        lower, left = (w[..., None] for w in self.grid.edge_weights)
+        warp, weft = self._warp_edges, self._weft_edges
+        g1 = (lower * warp[:-1] + (1.0 - lower) * warp[1:]) / self.grid.warp_pitch
+        g2 = (left * weft[:, :-1] + (1.0 - left) * weft[:, 1:]) / self.grid.weft_pitch
+        return g1, g2
+
+    @cached_property
+    def shear_angle(self) -> Floats:
+        """Shear angle of the cells [rad], shape [rows - 1, columns - 1], positive where warp and weft close; NaN where none."""
+        return np.where(self.grid.cells != Cell.ABSENT, _angle(*self.vectors), np.nan)
+
+    @cached_property
+    def corner_shear(self) -> Floats:
+        """Angle by which the connectors that meet at each corner of a cell have closed [rad], shape [4, rows - 1, columns - 1].
+
+        As the paper measures it (Sec. 3.6). Corners in the order (0,0), (1,0), (1,1), (0,1); NaN where a connector is missing.
+        """
+        warp, weft = self._warp_edges, self._weft_edges
+        has_warp, has_weft = self.grid.warp_lines > 0.0, self.grid.weft_lines > 0.0
+        corners = (
+            (warp[:-1], weft[:, :-1], has_warp[:-1] & has_weft[:, :-1]),
+            (warp[:-1], weft[:, 1:], has_warp[:-1] & has_weft[:, 1:]),
+            (warp[1:], weft[:, 1:], has_warp[1:] & has_weft[:, 1:]),
+            (warp[1:], weft[:, :-1], has_warp[1:] & has_weft[:, :-1]),
+        )
+        exists = self.grid.cells != Cell.ABSENT
+        return np.stack([np.where(has & exists, _angle(a, b), np.nan) for a, b, has in corners])
+
+    @cached_property
+    def node_shear(self) -> Floats:
+        """Mean of the angles at a crossing [rad], shape [rows, columns]; NaN outside the blank."""
+        total = np.zeros(self.grid.shape)
+        count = np.zeros(self.grid.shape)
+        rows, columns = self.grid.cells.shape
+        for values, (di, dj) in zip(self.corner_shear, ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
+            known = np.isfinite(values)
+            total[dj : dj + rows, di : di + columns] += np.where(known, values, 0.0)
+            count[dj : dj + rows, di : di + columns] += known
+        with np.errstate(invalid="ignore"):
+            return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    def _lines(self, warp: bool) -> tuple[Floats, Floats]:
+        """Nominal strain and force [N] of the connectors of one direction."""
+        edges = self._warp_edges if warp else self._weft_edges
+        pitch = self.grid.warp_pitch if warp else self.grid.weft_pitch
+        spacing = self.grid.weft_pitch if warp else self.grid.warp_pitch
+        law: TensionLaw = self.fabric.warp if warp else self.fabric.weft
+        strain = np.linalg.norm(edges, axis=-1) / pitch - 1.0
+        line = law.line_law(spacing)
+        force = line.value(np.maximum(strain, 0.0)) + law.slack_ratio * line.slope(0.0) * np.minimum(
+            strain, 0.0
+        )
+        return strain, force
+
+    def _on_cells(self, values: Floats, warp: bool) -> Floats:
+        lower, left = self.grid.edge_weights
+        if warp:
+            return lower * values[:-1] + (1.0 - lower) * values[1:]
+        return left * values[:, :-1] + (1.0 - left) * values[:, 1:]
+
+    @cached_property
+    def warp_strain(self) -> Floats:
+        """Nominal strain of the warp yarns, mean of a cell's connectors, shape [rows - 1, columns - 1]."""
+        return self._on_cells(self._lines(True)[0], True)
+
+    @cached_property
+    def weft_strain(self) -> Floats:
+        """Nominal strain of the weft yarns."""
+        return self._on_cells(self._lines(False)[0], False)
+
+    @cached_property
+    def warp_force(self) -> Floats:
+        """Tension of the warp per width [N/mm], shape [rows - 1, columns - 1]."""
+        return self._on_cells(self._lines(True)[1], True) / self.grid.weft_pitch
+
+    @cached_property
+    def weft_force(self) -> Floats:
+        """Tension of the weft per width [N/mm]."""
+        return self._on_cells(self._lines(False)[1], False) / self.grid.warp_pitch
+
+    @cached_property
+    def directions(self) -> tuple[Floats, Floats]:
+        """Unit warp and weft directions of the cells, shape [rows - 1, columns - 1, 3] each."""
+        g1, g2 = self.vectors
+        return g1 / _norm(g1), g2 / _norm(g2)
+
+    @cached_property
+    def membrane_stress(self) -> Floats:
+        """Cauchy stress (xx, yy, xy) of the membrane [MPa], shape [rows - 1, columns - 1, 3].
+
+        Components in the plane of the cell, in axes that are x and y turned by the smallest rotation that brings z onto the
+        cell's normal; on a flat cell they are x and y.
+        """
+        g1, g2 = self.vectors
+        f1, f2 = self.directions
+        normal = np.cross(f1, f2)
+        normal = normal / _norm(normal)
+        e_x, e_y = _plane_axes(normal)
+        card = self.fabric.card.membrane
+        s1 = card.warp_modulus_MPa * np.log(_norm(g1)[..., 0])
+        s2 = card.weft_modulus_MPa * np.log(_norm(g2)[..., 0])
+        tau = self.fabric.shear.shear_stress(_angle(g1, g2))
+        p1 = np.cross(normal, f1)
+        p2 = -np.cross(normal, f2)
+        # Eq. 24: sigma12 / 2 in each of the two yarn frames, (f1, f1 turned +90) and (f2 turned -90, f2)
+        stress = (
+            s1[..., None, None] * _dyad(f1, f1)
+            + s2[..., None, None] * _dyad(f2, f2)
+            + 0.5 * tau[..., None, None] * (_dyad(f1, p1) + _dyad(p1, f1) + _dyad(p2, f2) + _dyad(f2, p2))
+        )
+        parts = [np.einsum("...i,...ij,...j", a, stress, b) for a, b in ((e_x, e_x), (e_y, e_y), (e_x, e_y))]
+        return np.stack(parts, axis=-1)
+
+    def cell_data(self) -> dict[str, Floats]:
+        """Fields of the cells by the names of the result files, one row per cell that exists."""
+        here = self.grid.cells != Cell.ABSENT
+        warp_direction, weft_direction = self.directions
+        thickness = self.fabric.thickness
+        return {
+            "ShearAngle_deg": np.degrees(self.shear_angle)[here],
+            "WarpStrain": self.warp_strain[here],
+            "WeftStrain": self.weft_strain[here],
+            "WarpForce_N_per_mm": self.warp_force[here],
+            "WeftForce_N_per_mm": self.weft_force[here],
+            "WarpStress_MPa": self.warp_force[here] / thickness,
+            "WeftStress_MPa": self.weft_force[here] / thickness,
+            "WarpDirection": warp_direction[here],
+            "WeftDirection": weft_direction[here],
+            "MembraneStress_MPa": self.membrane_stress[here],
+        }
+
+    def shear_statistics(self) -> dict[str, float]:
+        """Sizes of the shear angle [degrees]: largest between connectors that meet, and over the cells by area."""
+        share = self.grid.cell_share
+        here = share > 0.0
+        sizes = np.degrees(np.abs(self.shear_angle[here]))
+        order = np.argsort(sizes)
+        weight = np.cumsum(share[here][order])
+        corner = np.degrees(np.nanmax(np.abs(self.corner_shear)))
+        return {
+            "max": float(corner),
+            "max_cell": float(sizes.max()),
+            "p99": float(np.interp(0.99 * weight[-1], weight, sizes[order])),
+            "mean": float((share[here] * np.degrees(np.abs(self.shear_angle[here]))).sum() / share.sum()),
+        }
+
+
+def _norm(vectors: Floats) -> Floats:
+    return np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+
+
+def _angle(a: Floats, b: Floats) -> Floats:
+    """Angle by which two vectors, at right angles at first, have closed [rad]."""
+    return np.arctan2((a * b).sum(axis=-1), np.linalg.norm(np.cross(a, b), axis=-1))
+
+
+def _dyad(a: Floats, b: Floats) -> Floats:
+    return a[..., :, None] * b[..., None, :]
+
+
+def _plane_axes(normal: Floats) -> tuple[Floats, Floats]:
+    """x and y turned by the smallest rotation that takes z to the normal (Rodrigues)."""
+    nx, ny, nz = normal[..., 0], normal[..., 1], normal[..., 2]
+    denominator = np.where(1.0 + nz < 1e-9, 1.0, 1.0 + nz)
+    e_x = np.stack([1.0 - nx * nx / denominator, -nx * ny / denominator, -nx], axis=-1)
+    e_y = np.stack([-nx * ny / denominator, 1.0 - ny * ny / denominator, -ny], axis=-1)
+    return e_x, e_y

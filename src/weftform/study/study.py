@@ -1,0 +1,266 @@
+"""A study: a declared problem, read from TOML, checked, and turned into what the solver needs."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from shapely.geometry import Polygon
+
+from weftform.blank import YarnGrid, build_grid, disc, polygon, rectangle
+from weftform.declared import read_toml, validated
+from weftform.errors import CardError, StudyError
+from weftform.fabric import Fabric
+from weftform.fabric.fabric import merge_tables
+from weftform.study.schema import BlankTable, StudyModel, ToolTable
+from weftform.tooling import RigidTool, flat_punch, hemisphere, opening
+
+PLANES = {"full": (), "half-x": ("x",), "half-y": ("y",), "quarter": ("x", "y")}
+
+
+def shipped_studies() -> dict[str, Path]:
+    """Names and files of the studies in the package."""
+    folder = resources.files("weftform") / "data" / "studies"
+    return {
+        p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)
+    }
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study.
+
+    Attributes
+    ----------
+    model
+        What it says, defaults filled in.
+    file
+        Where it was read; cards are looked up next to it.
+    """
+
+    model: StudyModel
+    file: Path | None = None
+
+    @classmethod
+    def load(cls, study: str | Path, changes: Iterable[str] | Mapping[str, Any] = ()) -> Study:
+        """Read a study by shipped name or file.
+
+        Parameters
+        ----------
+        study
+            A shipped name (``weftform studies``) or the path of a TOML file.
+        changes
+            ``dotted.key=value`` texts, or a mapping of dotted keys to values.
+
+        Raises
+        ------
+        StudyError, CardError
+            With file, line and key of the first problem.
+        """
+        shipped = shipped_studies()
+        path = shipped[str(study)] if str(study) in shipped else Path(study)
+        if not path.exists() and path.suffix != ".toml":
+            raise StudyError(
+                f'no study named "{study}"',
+                expected="a shipped study (" + ", ".join(shipped) + ") or a file ending in .toml",
+                hint="`weftform studies` lists the shipped studies, `weftform new` writes one to start from",
+            )
+        values, text = read_toml(path, StudyError)
+        pairs = changes.items() if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
+        for key, value in pairs:
+            values = _changed(values, key.split("."), value)
+        made = cls(validated(StudyModel, values, StudyError, file=path, text=text), path.resolve())
+        try:
+            made.check()
+        except (StudyError, CardError) as problem:
+            raise _placed(problem, path, text) from None
+        return made
+
+    def check(self) -> None:
+        """Build everything that a run would build, so that what cannot work is refused before anything is written."""
+        self.fabric  # noqa: B018
+        self._check_symmetry()
+        self.grid  # noqa: B018
+        self._check_tools()
+
+    @property
+    def name(self) -> str:
+        return self.model.name
+
+    @cached_property
+    def fabric(self) -> Fabric:
+        """The fabric, with the variant and changes that the study asks for."""
+        choice = self.model.fabric
+        near = self.file.parent if self.file is not None else None
+        return Fabric.load(choice.card, variant=choice.tension_variant, override=choice.override, near=near)
+
+    @cached_property
+    def outline(self) -> Polygon:
+        """Declared outline of the blank in the plane of the press [mm]."""
+        return _outline(self.model.blank)
+
+    @cached_property
+    def grid(self) -> YarnGrid:
+        """The yarn grid that covers the outline."""
+        blank = self.model.blank
+        return build_grid(
+            self.outline,
+            cell_length=blank.cell_length_mm,
+            warp_angle=math.radians(blank.warp_angle_deg),
+            planes=PLANES[blank.symmetry],
+            fitted=blank.fit_cells,
+        )
+
+    @cached_property
+    def tools(self) -> tuple[RigidTool, ...]:
+        """Rigid tools in the order of the study."""
+        return tuple(self._tool(name, table) for name, table in self.model.tools.items())
+
+    def _tool(self, name: str, table: ToolTable) -> RigidTool:
+        thickness = self.fabric.thickness
+        up = 1.0 if table.side == "below" else -1.0
+        if table.shape == "hemisphere":
+            assert table.diameter_mm is not None
+            shape = hemisphere(table.diameter_mm, thickness, up)
+        elif table.shape == "flat-punch":
+            assert table.diameter_mm is not None and table.edge_radius_mm is not None
+            shape = flat_punch(table.diameter_mm, table.edge_radius_mm, thickness, up)
+        else:
+            assert table.hole_diameter_mm is not None and table.edge_radius_mm is not None
+            shape = opening(table.hole_diameter_mm, table.edge_radius_mm, thickness, up)
+        contact = self.model.contact[name]
+        return RigidTool(
+            name,
+            *shape,
+            up=up,
+            motion=table.motion,
+            friction=contact.friction,
+            stiffness=contact.stiffness_N_per_mm3,
+            tangential_ratio=contact.tangential_ratio,
+            force=table.force_N or 0.0,
+            mass=table.mass_kg * 1e-3 if table.mass_kg else None,
+        )
+
+    def _check_symmetry(self) -> None:
+        blank = self.model.blank
+        eighths = blank.warp_angle_deg / 45.0
+        odd = abs(eighths - round(eighths)) < 1e-9 and round(eighths) % 2 == 1
+        if blank.symmetry != "full" and odd and not self.fabric.balanced:
+            raise StudyError(
+                "an unbalanced fabric at 45 degrees has no plane of symmetry: its mirror image has warp and weft exchanged",
+                key="blank.symmetry",
+                expected='"full", or a fabric whose warp and weft are alike',
+                got=f'"{blank.symmetry}"',
+            )
+
+    def _check_tools(self) -> None:
+        smallest = min(math.hypot(*point) for point in self.outline.exterior.coords)
+        nearest = self.outline.exterior.distance(_origin())
+        for name, table in self.model.tools.items():
+            hole = table.hole_diameter_mm
+            if hole is None or table.edge_radius_mm is None:
+                continue
+            if nearest <= 0.5 * hole + table.edge_radius_mm:
+                raise StudyError(
+                    f"the blank is smaller than the hole of the {name.replace('_', ' ')}",
+                    key="blank",
+                    expected=f"an edge more than {0.5 * hole + table.edge_radius_mm:g} mm from the axis everywhere",
+                    got=f"{min(nearest, smallest):g} mm",
+                )
+            for other, punch in self.model.tools.items():
+                if punch.motion != "stroke" or punch.side == table.side or punch.diameter_mm is None:
+                    continue
+                gap = 0.5 * (hole - punch.diameter_mm)
+                if gap < self.fabric.thickness:
+                    raise StudyError(
+                        f"the {other} does not fit through the {name} with the fabric between them",
+                        key=f"tools.{other}.diameter_mm",
+                        expected=f"a gap of at least the thickness, {self.fabric.thickness:g} mm",
+                        got=f"{gap:g} mm",
+                    )
+
+    def to_toml(self, header: str = "") -> str:
+        """The study as TOML with every default written out, cards given by path made absolute."""
+        import tomlkit
+
+        values = self.model.model_dump(mode="json", exclude_none=True)
+        if self.file is not None and self.model.fabric.card.endswith(".toml"):
+            values["fabric"]["card"] = str((self.file.parent / self.model.fabric.card).resolve())
+        text = tomlkit.dumps(values)
+        return "".join(f"# {line}\n" for line in header.splitlines()) + text
+
+
+def _origin() -> Any:
+    from shapely.geometry import Point
+
+    return Point(0.0, 0.0)
+
+
+def _outline(blank: BlankTable) -> Polygon:
+    if blank.outline == "rectangle":
+        assert blank.width_mm is not None and blank.height_mm is not None
+        return rectangle(blank.width_mm, blank.height_mm)
+    if blank.outline == "disc":
+        assert blank.diameter_mm is not None
+        return disc(blank.diameter_mm)
+    assert blank.points_mm is not None
+    shape = polygon([tuple(p) for p in blank.points_mm])
+    if not shape.is_valid or shape.area <= 0.0:
+        from shapely.validation import explain_validity
+
+        raise StudyError(
+            f"the polygon is not a simple outline ({explain_validity(shape)})",
+            key="blank.points_mm",
+            hint="list the corners once, in order around the blank",
+        )
+    return shape
+
+
+def _split_change(change: str) -> tuple[str, Any]:
+    key, equals, value = change.partition("=")
+    if not equals or not key.strip():
+        raise StudyError(
+            "a change must be of the form dotted.key=value",
+            got=change,
+            hint="for example blank.warp_angle_deg=45",
+        )
+    try:
+        return key.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
+def _changed(values: dict[str, Any], path: list[str], value: Any) -> dict[str, Any]:
+    """A copy of nested tables with one dotted key changed; the keys themselves are checked with the whole study."""
+    nested: Any = value
+    for part in reversed(path[1:]):
+        nested = {part: nested}
+    if len(path) == 1:
+        return {**values, path[0]: value}
+    if path[0] in values and not isinstance(values[path[0]], Mapping):
+        raise StudyError(f"{path[0]} is a value, not a table", key=".".join(path))
+    return merge_tables(values, {path[0]: nested})
+
+
+def _placed(problem: StudyError | CardError, path: Path, text: str) -> StudyError | CardError:
+    """The same error with the file and line of the study where it names a key of the study."""
+    from weftform.declared import line_of
+
+    if problem.file is not None:
+        return problem
+    line = line_of(text, tuple(problem.key.split("."))) if problem.key else None
+    return type(problem)(
+        problem.message,
+        file=path,
+        line=line,
+        key=problem.key,
+        expected=problem.expected,
+        got=problem.got,
+        hint=problem.hint,
+    )
