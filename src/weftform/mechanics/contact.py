@@ -14,7 +14,9 @@ import math
 
 from weftform.mechanics.compiled import scalar
 
-TINY = 1.0e-300
+TINY = 1.0e-150
+"""Floor of a length or force that divides. Its square is still a normal number: a smaller one vanishes when squared, and
+would then be divided by the floor instead of by itself."""
 
 
 @scalar
@@ -29,7 +31,7 @@ def rounded_edge(
     reach = math.sqrt(outside_u * outside_u + outside_w * outside_w)
     depth = min(max(u, w), 0.0)
     inverse = 1.0 / max(reach, TINY)
-    deep = 1.0 if depth < 0.0 else 0.0
+    deep = 1.0 if reach <= 0.0 else 0.0
     flat = 1.0 if w >= u else 0.0
     normal_u = outside_u * inverse + deep * (1.0 - flat)
     normal_w = outside_w * inverse + deep * flat

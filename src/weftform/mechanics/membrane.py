@@ -13,7 +13,7 @@ import math
 from typing import Any
 
 from weftform.mechanics.compiled import scalar
-from weftform.mechanics.piecewise import horner, odd, piecewise_slope, piecewise_value
+from weftform.mechanics.piecewise import horner, piecewise_slope, piecewise_value
 
 SMALLEST_AREA_RATIO = 1.0e-6
 """Floor of the squared area ratio of a cell: a folded cell keeps a finite force until the run is stopped."""
@@ -43,7 +43,7 @@ def shear_angle(g11: float, g22: float, g12: float) -> float:
 def shear_stress(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float) -> float:
     """``tau`` [MPa] as a law in ``t = tan(gamma / 2)``, odd in ``t``. The fitted polynomial is of ``tau / t``."""
     size = abs(t)
-    return odd(size * piecewise_value(coefficients, degree, pieces, width, end_slope, size), t)
+    return t * piecewise_value(coefficients, degree, pieces, width, end_slope, size)
 
 
 @scalar
