@@ -119,6 +119,10 @@ class ShearTable(Declared):
             raise ValueError('law "constant" gives a shear modulus')
         if self.law == "tabulated" and self.quantity == "shear-modulus":
             raise ValueError("a tabulated shear law is of shear-stress or normalised-shear-force")
+        if self.law == "tabulated" and "valid_to_deg" in self.model_fields_set:
+            raise ValueError("a tabulated shear law is valid to its last point: leave out valid_to_deg")
+        if self.law == "tabulated" and self.shear_angle_deg and max(self.shear_angle_deg) > 90.0:
+            raise ValueError("shear angles of a table must not exceed 90 degrees")
         return self
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -11,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from weftform.declared import read_toml, validated
+from weftform.declared import line_of, read_toml, validated
 from weftform.errors import CardError
 from weftform.fabric.card import FabricCard, TensionPair, TensionTable
 from weftform.fabric.laws import (
@@ -158,6 +159,7 @@ class Fabric:
             raise CardError(
                 problem.message,
                 file=problem.file,
+                line=line_of(text, tuple(problem.key.split("."))) if problem.key else None,
                 key=problem.key,
                 expected=problem.expected,
                 got=problem.got,
@@ -194,8 +196,12 @@ class Fabric:
         pair = self._pair()
         table: TensionTable = getattr(pair, direction)
         if table.same_as is not None:
-            table = getattr(pair, table.same_as)
-        return _tension_law(table)
+            direction, table = table.same_as, getattr(pair, table.same_as)
+        with _errors_at(self._tension_key(direction)):
+            return _tension_law(table)
+
+    def _tension_key(self, direction: Direction) -> str:
+        return f"tension.{f'variants.{self.variant}.' if self.variant else ''}{direction}"
 
     @cached_property
     def warp(self) -> TensionLaw:
@@ -225,7 +231,8 @@ class Fabric:
             law = PolynomialLaw(tuple(powers), end)
         else:
             assert table.shear_angle_deg is not None and table.values is not None
-            law = TabulatedLaw(tuple(np.radians(table.shear_angle_deg)), tuple(table.values))
+            with _errors_at("shear"):
+                law = Scaled(TabulatedLaw(tuple(table.shear_angle_deg), tuple(table.values)), np.degrees(1.0))
             end = law.valid_to
         return ShearLaw(Scaled(law, factor_y=per_thickness), end)
 
@@ -249,7 +256,7 @@ class Fabric:
         """
         for direction, tension in (("warp", self.warp), ("weft", self.weft)):
             law = tension.specimen_force
-            key = f"tension.{f'variants.{self.variant}.' if self.variant else ''}{direction}"
+            key = self._tension_key(direction)
             upper = law.valid_to if np.isfinite(law.valid_to) else MOST_STRETCH * tension.length
             fall = first_fall(law, upper)
             if fall is not None:
@@ -282,12 +289,23 @@ class Fabric:
             )
 
 
+@contextmanager
+def _errors_at(key: str) -> Iterator[None]:
+    """Name the place of an error that a law raises, which knows no card."""
+    try:
+        yield
+    except CardError as problem:
+        raise CardError(
+            problem.message, key=key, expected=problem.expected, got=problem.got, hint=problem.hint
+        ) from None
+
+
 def merge_tables(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge nested tables; a table that brings its own ``law`` replaces the one it stands for."""
+    """Merge nested tables; one that brings its own ``law`` or ``same_as`` replaces the one it stands for."""
     merged = dict(base)
     for key, value in over.items():
         old = merged.get(key)
-        if isinstance(value, Mapping) and isinstance(old, Mapping) and "law" not in value:
+        if isinstance(value, Mapping) and isinstance(old, Mapping) and not {"law", "same_as"} & value.keys():
             merged[key] = merge_tables(old, value)
         else:
             merged[key] = dict(value) if isinstance(value, Mapping) else value

@@ -30,6 +30,11 @@ from weftform.fabric.total_form import (
 __all__ = ["FibreFrameHistory", "Frames", "integrate_fibre_frames", "polar_rotation"]
 
 
+SMALLEST_MIDPOINT = 0.01
+"""Area of the mean of two gradients over the geometric mean of theirs, below which a step says nothing: for a
+rigid turn it is the squared cosine of half the angle, so this is a turn by 169 degrees in one step."""
+
+
 class Frames(Enum):
     """Which configuration of a step the frames and the shear modulus are taken from."""
 
@@ -132,7 +137,7 @@ def integrate_fibre_frames(
     ------
     ValueError
         Wrong shape, not finite, a determinant that is not positive, or a step so large that the mean of its
-        two gradients is turned inside out.
+        two gradients has almost no area.
 
     References
     ----------
@@ -144,10 +149,11 @@ def integrate_fibre_frames(
         raise ValueError(f"expected a path of shape [steps, 2, 2], got {list(path.shape)}")
     before = np.concatenate([np.eye(2)[None], path[:-1]])
     middle = 0.5 * (before + path)
-    turned = np.flatnonzero(np.linalg.det(middle) <= 0.0)
+    kept = np.linalg.det(middle) / np.sqrt(np.linalg.det(before) * np.linalg.det(path))
+    turned = np.flatnonzero(kept < SMALLEST_MIDPOINT)
     if turned.size:
         raise ValueError(
-            f"step {turned[0]} is too large: halfway between its ends the cell is inside out; give more steps"
+            f"step {turned[0]} is too large: the mean of its two gradients has almost no area; give more steps"
         )
 
     velocity = (path - before) @ np.linalg.inv(middle)

@@ -165,14 +165,19 @@ class Sum:
 
     @property
     def valid_to(self) -> float:
-        finite = [law.valid_to for law in self.laws if np.isfinite(law.valid_to)]
-        return max(finite) if finite else np.inf
+        return max((law.valid_to for law in self.laws if not _is_straight(law)), default=np.inf)
 
     def value(self, x: Floats | float) -> Floats:
         return np.sum([law.value(x) for law in self.laws], axis=0)
 
     def slope(self, x: Floats | float) -> Floats:
         return np.sum([law.slope(x) for law in self.laws], axis=0)
+
+
+def _is_straight(law: Law) -> bool:
+    while isinstance(law, Scaled):
+        law = law.law
+    return isinstance(law, LinearLaw) or (isinstance(law, Sum) and all(map(_is_straight, law.laws)))
 
 
 @dataclass(frozen=True)
