@@ -96,7 +96,12 @@ def test_a_tabulated_shear_law_is_in_degrees():
 
 @pytest.mark.parametrize(
     ("written", "reason", "got"),
-    [("-0.62", "greater than 0", "-0.62"), ("nan", "finite", "nan"), ("inf", "finite", "inf"), ('"thick"', "number", "thick")],
+    [
+        ("-0.62", "greater than 0", "-0.62"),
+        ("nan", "finite", "nan"),
+        ("inf", "finite", "inf"),
+        ('"thick"', "number", "thick"),
+    ],
 )
 def test_thickness_must_be_a_positive_number(tmp_path, written, reason, got):
     error = refusal(tmp_path, "thickness_mm = 0.62", f"thickness_mm = {written}")
@@ -194,7 +199,12 @@ def test_shear_tables_that_cannot_be_used(extra, reason):
 
 
 def test_an_override_with_a_law_or_a_reference_replaces_the_table():
-    linear = {"law": "linear", "stiffness_N_per_mm": 100.0, "specimen_length_mm": 10.0, "specimen_width_mm": 5.0}
+    linear = {
+        "law": "linear",
+        "stiffness_N_per_mm": 100.0,
+        "specimen_length_mm": 10.0,
+        "specimen_width_mm": 5.0,
+    }
     fabric = Fabric.load(SHIPPED, override={"tension": {"weft": linear}})
     assert float(fabric.weft.force(2.0)) == 200.0 and not fabric.balanced
     fabric = Fabric.load(SHIPPED, override={"tension": {"weft": linear, "warp": {"same_as": "weft"}}})

@@ -58,8 +58,8 @@ def state_vector(history):
 def assert_converges(path, exact, evaluate, steps=200):
     """The error of the finer of two step sizes is less than the difference between the two.
 
-    For second order the error falls to a quarter, so the difference is three times the error of the finer one. The floor
-    is the rounding of ``2 * steps`` additions.
+    For second order the error falls to a quarter, so the difference is three times the error of the finer
+    one. The floor is the rounding of ``2 * steps`` additions.
     """
     coarse, fine = evaluate(path(steps)), evaluate(path(2 * steps))
     error, difference = np.linalg.norm(fine - exact), np.linalg.norm(fine - coarse)
@@ -103,13 +103,12 @@ def closed_loop(steps):
 
 
 def test_closed_loop_with_the_mean_returns_to_no_shear_stress():
-    assert_converges(
-        closed_loop, 0.0, lambda path: integrate_fibre_frames(path, *MODULI).stress[-1, 0, 1]
-    )
+    assert_converges(closed_loop, 0.0, lambda path: integrate_fibre_frames(path, *MODULI).stress[-1, 0, 1])
 
 
 def test_closed_loop_without_the_mean_leaves_shear_stress():
-    """Only the unstretching happens in a sheared state, at tan(gamma) = 1: it leaves +-ln 1.02 in the two frames."""
+    """Only the unstretching happens in a sheared state, at tan(gamma) = 1: it leaves +-ln 1.02 in the two
+    frames."""
     left = MODULI[2] * np.log(1.02)
 
     def frame_shears(path):
@@ -118,9 +117,11 @@ def test_closed_loop_without_the_mean_leaves_shear_stress():
 
     assert_converges(closed_loop, np.array([left, -left]), frame_shears)
     apart = integrate_fibre_frames(closed_loop(400), *MODULI, average_frame_shears=False)
-    # The cell is square again, so the stress left by half of each shear is their mean in xy: it cancels there ...
+    # The cell is square again, so the stress left by half of each shear is their mean in xy: it cancels
+    # there ...
     assert abs(apart.stress[-1, 0, 1]) < 1e-4 * left
-    # ... but not on the way: sheared and unstretched, the same state has another stress than the state function gives.
+    # ... but not on the way: sheared and unstretched, the same state has another stress than the state
+    # function gives.
     end_of_unstretching = 3 * 400 - 1
     exact = total_form(closed_loop(400)[end_of_unstretching], *MODULI).stress
     assert np.abs(apart.stress[end_of_unstretching] - exact).max() > 0.1 * left
@@ -136,9 +137,11 @@ def measured_orders(frames):
 
 
 def test_full_turn_while_straining_converges_with_second_order():
-    """F. The midpoint rule has an error in even powers, so the measured order departs from 2 by a term in step^2.
+    """F. The midpoint rule has an error in even powers, so the measured order departs from 2 by a term in
+    step^2.
 
-    With 2 pi / 100 per step the next term is some (2 pi / 100)^2 = 0.004 of the first; 0.05 leaves it a factor of ten.
+    With 2 pi / 100 per step the next term is some (2 pi / 100)^2 = 0.004 of the first; 0.05 leaves it a
+    factor of ten.
     """
     np.testing.assert_allclose(measured_orders(Frames.MIDPOINT), 2.0, atol=0.05)
 
@@ -149,13 +152,14 @@ def test_frames_of_the_end_of_the_step_are_first_order():
 
 
 smooth = st.lists(st.floats(-0.15, 0.15), min_size=8, max_size=8).map(lambda v: np.reshape(v, (4, 2)))
-ends = st.tuples(
-    st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)
-).map(np.array)
+ends = st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)).map(
+    np.array
+)
 
 
 def wandering(end, detour):
-    """A path to ``end`` (log strains, shear angle, turn) with two harmonics of detour in each, shape [4, 2]."""
+    """A path to ``end`` (log strains, shear angle, turn) with two harmonics of detour in each, shape [4,
+    2]."""
 
     def path(steps):
         t = np.linspace(0.0, 1.0, steps + 1)[1:]
@@ -181,11 +185,13 @@ def test_stress_does_not_depend_on_the_path(end, detour, other_detour):
 @settings(deadline=None, derandomize=True, max_examples=30)
 @given(ends, smooth, st.floats(-2.5, 2.5))
 def test_rigid_turn_of_the_whole_path_leaves_the_stress_co_rotated(end, detour, angle):
-    """Exact at any step: the first step turns and strains together, so the path begins with the turn alone."""
+    """Exact at any step: the first step turns and strains together, so the path begins with the turn
+    alone."""
     path = np.concatenate([np.eye(2)[None], wandering(end, detour)(50)])
     before = integrate_fibre_frames(path, *MODULI)
     after = integrate_fibre_frames(turn(angle) @ path, *MODULI)
-    # Rounding only, 50 additions; a turn by up to 2.5 rad in one step leaves 1 / cos(1.25) = 3 in the inverse.
+    # Rounding only, 50 additions; a turn by up to 2.5 rad in one step leaves 1 / cos(1.25) = 3 in the
+    # inverse.
     atol = 1e-12 * MODULI[0]
     np.testing.assert_allclose(after.stress, turn(angle) @ before.stress @ turn(angle).T, atol=atol)
     np.testing.assert_allclose(after.green_naghdi_stress, before.green_naghdi_stress, atol=atol)
@@ -209,7 +215,8 @@ def test_strains_and_angle_belong_to_the_gradient():
     history = integrate_fibre_frames(straight_path(TEST_A, 1000), *MODULI)
     state = total_form(TEST_A, *MODULI).kinematics
     assert history.shear_angle[-1] == pytest.approx(state.shear_angle, rel=1e-14)
-    # One midpoint step of relative stretch d errs by d^3 / 12; a thousand steps of 2e-5 and 3e-4 stay below 1e-9.
+    # One midpoint step of relative stretch d errs by d^3 / 12; a thousand steps of 2e-5 and 3e-4 stay below
+    # 1e-9.
     assert history.warp_log_strain[-1] == pytest.approx(state.warp_log_strain, abs=1e-9)
     assert history.weft_log_strain[-1] == pytest.approx(state.weft_log_strain, abs=1e-7)
 

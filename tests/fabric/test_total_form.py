@@ -32,7 +32,8 @@ def gradient(warp_stretch, weft_stretch, shear_angle, rigid_turn=0.0) -> np.ndar
 
 
 def trellis(angle) -> np.ndarray:
-    """Gradients [..., 2, 2] of two yarns that close symmetrically by a shear angle [...] and keep their length."""
+    """Gradients [..., 2, 2] of two yarns that close symmetrically by a shear angle [...] and keep their
+    length."""
     c, s = np.cos(angle / 2), np.sin(angle / 2)
     return np.moveaxis(np.array([[c, s], [s, c]]), (0, 1), (-2, -1))
 
@@ -81,7 +82,8 @@ def test_trellis():
 
 
 def test_printed_modulus_is_the_card_law_rounded_twice():
-    """Eq. 10 differs from the derivative of Eq. 8 over 0.62 mm by up to 1.8e-4 MPa in a coefficient (gamma^1): 0.1 %."""
+    """Eq. 10 differs from the derivative of Eq. 8 over 0.62 mm by up to 1.8e-4 MPa in a coefficient
+    (gamma^1): 0.1 %."""
     angle = np.radians([10.0, 20.0, 30.0, 40.0])
     printed = PolynomialLaw(tuple(EQ_10 / np.arange(1, 6)), np.pi / 2)
     card = Fabric.load("hexforce-48600-c1300").shear
@@ -97,9 +99,10 @@ def test_closed_loop_returns_to_no_stress():
 def test_square_cell_pulled_on_its_diagonal(degrees, newton):
     """G: the diagonal of a cell with inextensible sides a is 2 a cos(pi/4 - gamma/2).
 
-    Its force F does the work of the membrane, F d(diagonal) = e a^2 cos(gamma) (stress : D), and with no stretch the
-    right side is e a^2 cos(gamma) tau dgamma, so F = a F_sh(gamma) cos(gamma) / sin(pi/4 - gamma/2). The test takes the
-    power from the stress tensor and a finite rate of deformation instead of using that formula, then compares both.
+    Its force F does the work of the membrane, F d(diagonal) = e a^2 cos(gamma) (stress : D), and with no
+    stretch the right side is e a^2 cos(gamma) tau dgamma, so F = a F_sh(gamma) cos(gamma) / sin(pi/4 -
+    gamma/2). The test takes the power from the stress tensor and a finite rate of deformation instead of
+    using that formula, then compares both.
     """
     side, gamma, step = 2.69, np.radians(degrees), 1e-5
     fabric = Fabric.load("hexforce-48600-c1300")
@@ -112,9 +115,7 @@ def test_square_cell_pulled_on_its_diagonal(degrees, newton):
         return side * np.hypot(*trellis(angle).sum(axis=1))
 
     force = work / (diagonal(gamma + step) - diagonal(gamma - step))
-    closed = (
-        side * fabric.normalised_shear_force(gamma) * np.cos(gamma) / np.sin(np.pi / 4 - gamma / 2)
-    )
+    closed = side * fabric.normalised_shear_force(gamma) * np.cos(gamma) / np.sin(np.pi / 4 - gamma / 2)
     # Central differences: relative error step^2 times a factor of order one, plus rounding / step.
     assert force == pytest.approx(closed, rel=1e-9)
     assert closed == pytest.approx(newton, abs=0.5e-6)
@@ -133,7 +134,8 @@ def test_rigid_turn_leaves_the_stress_co_rotated(state, angle):
 @settings(deadline=None, derandomize=True, max_examples=60)
 @given(states, rates)
 def test_frame_shears_and_power(state, rate):
-    """2 D12 of the two frames is dgamma +- (dln l2 - dln l1) tan gamma, and stress : D is conjugate to all three."""
+    """2 D12 of the two frames is dgamma +- (dln l2 - dln l1) tan gamma, and stress : D is conjugate to all
+    three."""
     step = 1e-6
     ahead, behind = (yarn_kinematics(state + sign * step * rate) for sign in (1.0, -1.0))
     d_warp = (ahead.warp_log_strain - behind.warp_log_strain) / (2 * step)
@@ -148,8 +150,8 @@ def test_frame_shears_and_power(state, rate):
     in_warp_frame = 2.0 * f @ deformation_rate @ np.array([-f[1], f[0]])
     in_weft_frame = 2.0 * np.array([g[1], -g[0]]) @ deformation_rate @ g
     coupling = (d_weft - d_warp) * np.tan(now.shear_angle)
-    # Central differences: truncation step^2 * third derivative, rounding 1e-16 / step; stretches from 0.6 and angles to
-    # 1.2 rad keep the derivatives below some hundreds.
+    # Central differences: truncation step^2 * third derivative, rounding 1e-16 / step; stretches from 0.6
+    # and angles to 1.2 rad keep the derivatives below some hundreds.
     atol = 1e-8
     np.testing.assert_allclose(in_warp_frame, d_gamma + coupling, atol=atol)
     np.testing.assert_allclose(in_weft_frame, d_gamma - coupling, atol=atol)

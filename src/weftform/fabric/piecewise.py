@@ -74,7 +74,7 @@ def pack_law(law: Law, end: float) -> PiecewiseLaw:
         return pack_polynomial(scale_y * powers, inner.valid_to / scale_x)
     from scipy.interpolate import CubicHermiteSpline
 
-    x = np.linspace(0.0, min(end, law.valid_to), TABLE_PIECES + 1)
+    x = np.linspace(0.0, law.valid_to if np.isfinite(law.valid_to) else end, TABLE_PIECES + 1)
     spline = CubicHermiteSpline(x, law.value(x), law.slope(x))
     antiderivative = spline.antiderivative()
     return PiecewiseLaw(

@@ -15,8 +15,7 @@ import math
 from weftform.mechanics.compiled import scalar
 
 TINY = 1.0e-150
-"""Floor of a length or force that divides. Its square is still a normal number: a smaller one vanishes when squared, and
-would then be divided by the floor instead of by itself."""
+"""Smallest length or force that divides; the square of anything above it is a normal number."""
 
 
 @scalar
@@ -30,8 +29,8 @@ def rounded_edge(
     outside_w = max(w, 0.0)
     reach = math.sqrt(outside_u * outside_u + outside_w * outside_w)
     depth = min(max(u, w), 0.0)
-    inverse = 1.0 / max(reach, TINY)
-    deep = 1.0 if reach <= 0.0 else 0.0
+    deep = 1.0 if reach < TINY else 0.0
+    inverse = (1.0 - deep) / max(reach, TINY)
     flat = 1.0 if w >= u else 0.0
     normal_u = outside_u * inverse + deep * (1.0 - flat)
     normal_w = outside_w * inverse + deep * flat
