@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -132,8 +133,8 @@ def test_work_depends_on_the_path_at_constant_thickness():
     warp = 1.0 + (stretch - 1.0) * np.concatenate([[0.0], up, one, down, 0 * one])
     gamma = angle * np.concatenate([[0.0], 0 * one, up, one, down])
     path = [gradient(w, 1.0, g) for w, g in zip(warp, gamma, strict=True)]
-    middle = [0.5 * (a + b) for a, b in zip(path[:-1], path[1:], strict=True)]
-    work = sum(np.sum(forces(m) * (b - a)) for m, a, b in zip(middle, path[:-1], path[1:], strict=True))
+    middle = [0.5 * (a + b) for a, b in pairwise(path)]
+    work = sum(np.sum(forces(m) * (b - a)) for m, (a, b) in zip(middle, pairwise(path), strict=True))
     stretching = MODULI[0] * (stretch * math.log(stretch) - stretch + 1.0) * (1.0 - math.cos(angle))
     shearing = MODULI[2] * (stretch - 1.0) * (angle * math.sin(angle) + math.cos(angle) - 1.0)
     # Midpoint rule over 400 steps in each leg: relative error of order 1 / 400^2, a few in front.
