@@ -153,7 +153,7 @@ def test_log_stretch_of_the_series_of_artanh(stretch):
     series = 1.0 / np.arange(2 * terms - 1, 0, -2)
     y = (stretch**2 - 1) / (stretch**2 + 1)
     rest = abs(y) ** (2 * terms + 1) / (2 * terms + 1) / (1 - y * y)
-    assert abs(log_stretch(stretch**2, series, terms) - math.log(stretch)) <= rest + 1e-15
+    assert abs(log_stretch(stretch**2, tuple(series)) - math.log(stretch)) <= rest + 1e-15
 
 
 SHEAR_LAWS = {
@@ -180,6 +180,12 @@ def test_shear_stress_in_the_half_tangent_follows_the_law(name):
     np.testing.assert_allclose(fitted, law.shear_stress(angle), atol=tolerance * scale)
     np.testing.assert_array_equal(other_way, -fitted)  # odd, to the last bit
     assert shear_stress(*call, 0.0) == 0.0
+
+
+def test_shear_stress_takes_the_sign_of_its_law():
+    """A law that opposes nothing but pushes on, tau = -t: odd as any other."""
+    for t in (-0.5, 0.5):
+        assert shear_stress(np.array([0.0, -1.0]), 1, 1, 1.0, 0.0, t) == -t
 
 
 @pytest.mark.parametrize("name", SHEAR_LAWS)

@@ -8,7 +8,13 @@ from scipy.integrate import quad
 
 from weftform.fabric import LinearLaw, LogStrainLaw, PolynomialLaw, Scaled, Sum, TabulatedLaw
 from weftform.fabric.piecewise import TABLE_PIECES, pack_law
-from weftform.mechanics.piecewise import horner, piecewise_integral, piecewise_slope, piecewise_value
+from weftform.mechanics.piecewise import (
+    horner,
+    piecewise_integral,
+    piecewise_slope,
+    piecewise_value,
+    polynomial,
+)
 
 QUARTIC = PolynomialLaw((19.75, -123.13, 573.0, -91.645), 3.9)
 END = 3.0
@@ -116,3 +122,4 @@ def test_pieces_join(name):
 
 def test_horner_begins_with_the_highest_power():
     assert horner(np.array([9.0, 2.0, -1.0, 5.0]), 2, 1, 3.0) == 2.0 * 9 - 3.0 + 5.0
+    assert polynomial((2.0, -1.0, 5.0), 3.0) == polynomial(np.array([2.0, -1.0, 5.0]), 3.0) == 20.0

@@ -13,17 +13,17 @@ import math
 from typing import Any
 
 from weftform.mechanics.compiled import scalar
-from weftform.mechanics.piecewise import horner, piecewise_slope, piecewise_value
+from weftform.mechanics.piecewise import piecewise_slope, piecewise_value, polynomial
 
 SMALLEST_AREA_RATIO = 1.0e-6
 """Floor of the squared area ratio of a cell: a folded cell keeps a finite force until the run is stopped."""
 
 
 @scalar
-def log_stretch(squared_stretch: float, coefficients: Any, terms: int) -> float:
+def log_stretch(squared_stretch: float, coefficients: Any) -> float:
     """``ln l`` from ``l**2`` by the odd series in ``y = (l**2 - 1) / (l**2 + 1)``; ``coefficients`` are fitted."""
     y = (squared_stretch - 1.0) / (squared_stretch + 1.0)
-    return y * horner(coefficients, terms - 1, 0, y * y)
+    return y * polynomial(coefficients, y * y)
 
 
 @scalar

@@ -6,7 +6,6 @@ and logarithmic laws are many cubic pieces.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from weftform.mechanics.compiled import scalar
@@ -22,13 +21,22 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 
 
 @scalar
+def polynomial(coefficients: Any, x: float) -> float:
+    """Polynomial value, highest power first. From a tuple the loop unrolls: its length is part of its type."""
+    value = coefficients[0]
+    for k in range(1, len(coefficients)):
+        value = value * x + coefficients[k]
+    return value
+
+
+@scalar
 def piecewise_value(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float) -> float:
     """Value at ``x >= 0`` of a law with ``pieces`` polynomials of equal ``width``, linear beyond the last."""
     end = width * pieces
     inside = min(x, end)
     beyond = end_slope * max(x - end, 0.0)
     if pieces == 1:
-        return horner(coefficients, degree, 0, inside) + beyond
+        return polynomial(coefficients, inside) + beyond
     piece = min(int(inside / width), pieces - 1)
     return horner(coefficients, degree, piece * (degree + 1), inside - piece * width) + beyond
 
