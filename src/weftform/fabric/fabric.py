@@ -70,7 +70,7 @@ class TensionLaw:
         """Force of the specimen [N] at an elongation [mm], slack included."""
         u = np.asarray(elongation, float)
         push = self.slack_ratio * self.specimen_force.slope(0.0) * np.minimum(u, 0.0)
-        return self.specimen_force.value(np.maximum(u, 0.0)) + push
+        return np.asarray(self.specimen_force.value(np.maximum(u, 0.0)) + push)
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,8 @@ class Fabric:
         CardError
             Tension that does not rise over its validity, or a shear modulus that is negative within its validity.
         """
-        for direction, tension in (("warp", self.warp), ("weft", self.weft)):
+        tensions: tuple[tuple[Direction, TensionLaw], ...] = (("warp", self.warp), ("weft", self.weft))
+        for direction, tension in tensions:
             law = tension.specimen_force
             key = self._tension_key(direction)
             upper = law.valid_to if np.isfinite(law.valid_to) else MOST_STRETCH * tension.length

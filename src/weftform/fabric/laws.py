@@ -34,7 +34,7 @@ class Law(Protocol):
 
 
 def _straight_beyond(
-    x: Floats | float, valid_to: float, inner: Floats, at_end: Floats, end_slope: Floats
+    x: Floats | float, valid_to: float, inner: Floats, at_end: Floats | float, end_slope: Floats | float
 ) -> Floats:
     x = np.asarray(x, dtype=float)
     return np.where(x > valid_to, at_end + end_slope * (x - valid_to), inner)
@@ -151,10 +151,10 @@ class Scaled:
         return self.law.valid_to / self.factor_x
 
     def value(self, x: Floats | float) -> Floats:
-        return self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x)
+        return np.asarray(self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x))
 
     def slope(self, x: Floats | float) -> Floats:
-        return self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x)
+        return np.asarray(self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x))
 
 
 @dataclass(frozen=True)
@@ -168,10 +168,10 @@ class Sum:
         return max((law.valid_to for law in self.laws if not _is_straight(law)), default=np.inf)
 
     def value(self, x: Floats | float) -> Floats:
-        return np.sum([law.value(x) for law in self.laws], axis=0)
+        return np.asarray(np.sum([law.value(x) for law in self.laws], axis=0))
 
     def slope(self, x: Floats | float) -> Floats:
-        return np.sum([law.slope(x) for law in self.laws], axis=0)
+        return np.asarray(np.sum([law.slope(x) for law in self.laws], axis=0))
 
 
 def _is_straight(law: Law) -> bool:

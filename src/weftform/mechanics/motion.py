@@ -31,10 +31,13 @@ def soft_progress(progress: float, ramp: float) -> float:
 @scalar
 def motion_value(times: Any, values: Any, knots: int, ramp: float, time: float) -> float:
     """Value at ``time`` of a motion through ``knots`` points, soft between each pair."""
+    value: float = values[0]
     if time <= times[0]:
-        return values[0]
+        return value
     for k in range(knots - 1):
         if time < times[k + 1]:
             progress = (time - times[k]) / (times[k + 1] - times[k])
-            return values[k] + (values[k + 1] - values[k]) * soft_progress(progress, ramp)
-    return values[knots - 1]
+            value = values[k] + (values[k + 1] - values[k]) * soft_progress(progress, ramp)
+            return value
+    value = values[knots - 1]
+    return value

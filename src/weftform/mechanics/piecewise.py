@@ -14,7 +14,7 @@ from weftform.mechanics.compiled import scalar
 @scalar
 def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
     """Polynomial value; ``coefficients[start]`` is the highest power."""
-    value = coefficients[start]
+    value: float = coefficients[start]
     for k in range(1, degree + 1):
         value = value * x + coefficients[start + k]
     return value
@@ -23,7 +23,7 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 @scalar
 def polynomial(coefficients: Any, x: float) -> float:
     """Polynomial value, highest power first. From a tuple the loop unrolls: its length is part of its type."""
-    value = coefficients[0]
+    value: float = coefficients[0]
     for k in range(1, len(coefficients)):
         value = value * x + coefficients[k]
     return value
@@ -69,7 +69,7 @@ def piecewise_integral(
     value = 0.0
     for k in range(degree + 1):
         value = value * local + coefficients[start + k] / (degree + 1 - k)
-    total = integrals[piece] + value * local
+    total: float = integrals[piece] + value * local
     if x > end:
         at_end = horner(coefficients, degree, (pieces - 1) * (degree + 1), width)
         total += (x - end) * (at_end + 0.5 * end_slope * (x - end))
