@@ -70,6 +70,11 @@ def test_eqs_8_to_10_agree_for_the_thickness_of_the_fabric():
     # less for the last.
     np.testing.assert_allclose(EQ_8 / 0.62, eq_9, atol=8e-4)
     np.testing.assert_allclose(EQ_8 / 0.62 * np.arange(1, 6), eq_10, atol=2.5e-4)
+    angle = np.radians(np.linspace(0.1, 90.0, 900))
+    exact = PolynomialLaw(tuple(EQ_8 / 0.62), 2.0).value(angle)
+    for powers, worst in ((np.array(eq_9), 1.5e-3), (np.array(eq_10) / np.arange(1, 6), 0.9e-3)):
+        error = np.abs(PolynomialLaw(tuple(powers), 2.0).value(angle) / exact - 1)
+        assert error.max() == pytest.approx(worst, abs=0.5e-4)
 
 
 def test_rounding_the_numbers_of_eq_11():

@@ -82,7 +82,7 @@ def test_trellis():
 
 
 def test_printed_modulus_is_the_card_law_rounded_twice():
-    """Eq. 10 differs from the derivative of Eq. 8 over 0.62 mm by up to 1.8e-4 MPa in a coefficient
+    """Eq. 10 differs from the derivative of Eq. 8 over 0.62 mm by 1.8e-4 MPa in one coefficient
     (gamma^1): 0.1 %."""
     angle = np.radians([10.0, 20.0, 30.0, 40.0])
     printed = PolynomialLaw(tuple(EQ_10 / np.arange(1, 6)), np.pi / 2)
