@@ -31,8 +31,9 @@ class FabricTable(Declared):
 class TensionTable(Declared):
     """Force against elongation of a tensile specimen, F [N] of u [mm].
 
-    ``polynomial``: ``coefficients`` of u, u^2, ... and ``valid_to_mm``; ``linear`` and ``log-strain``: ``stiffness_N_per_mm``;
-    ``tabulated``: ``displacement_mm`` and ``force_N``. ``same_as`` copies the other direction.
+    ``polynomial``: ``coefficients`` of u, u^2, ... and ``valid_to_mm``; ``linear`` and ``log-strain``:
+    ``stiffness_N_per_mm``; ``tabulated``: ``displacement_mm`` and ``force_N``. ``same_as`` copies the other
+    direction.
     """
 
     law: Literal["polynomial", "linear", "log-strain", "tabulated"] | None = None
@@ -55,7 +56,9 @@ class TensionTable(Declared):
                 raise ValueError("give either same_as or law, not both")
             return self
         if self.law is None:
-            raise ValueError('law is missing (polynomial, linear, log-strain or tabulated), or same_as = "warp"')
+            raise ValueError(
+                'law is missing (polynomial, linear, log-strain or tabulated), or same_as = "warp"'
+            )
         needed = {
             "polynomial": ("coefficients", "valid_to_mm"),
             "linear": ("stiffness_N_per_mm",),
@@ -93,7 +96,8 @@ class ShearTable(Declared):
     """In-plane shear, one of three quantities, against the shear angle.
 
     ``shear-modulus``: G12 [MPa], polynomial with its constant first; ``shear-stress``: tau [MPa] and
-    ``normalised-shear-force``: F_sh [N/mm], polynomials of gamma, gamma^2, ... Angles of polynomials in radians, of tables in degrees.
+    ``normalised-shear-force``: F_sh [N/mm], polynomials of gamma, gamma^2, ... Angles of polynomials in
+    radians, of tables in degrees.
     """
 
     law: Literal["polynomial", "constant", "tabulated"]

@@ -29,13 +29,15 @@ from weftform.fabric.laws import (
 Direction = Literal["warp", "weft"]
 
 MOST_STRETCH = 2.0
-"""Largest nominal strain covered by the packed pieces of a law that has no limit of validity (element tests reach 1)."""
+"""Largest nominal strain covered by the packed pieces of a law without a limit (element tests reach 1)."""
 
 
 def shipped_cards() -> dict[str, Path]:
     """Names and files of the cards in the package."""
     folder = resources.files("weftform") / "data" / "cards"
-    return {p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)}
+    return {
+        p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)
+    }
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,9 @@ class TensionLaw:
     def line_law(self, spacing: float) -> Law:
         """Force [N] of one line of connectors against nominal strain, for lines ``spacing`` mm apart.
 
-        Eq. 11: the specimen is n + 1 = width / spacing + 1 lines in parallel (fractional values are meant), each a chain of
-        length / l0 connectors that share the elongation. Written in the strain u / length, l0 along the line drops out.
+        Eq. 11: the specimen is n + 1 = width / spacing + 1 lines in parallel (fractional values are meant),
+        each a chain of length / l0 connectors that share the elongation. Written in the strain u / length,
+        l0 along the line drops out.
         """
         lines = self.width / spacing + 1.0
         return Scaled(self.specimen_force, factor_x=self.length, factor_y=1.0 / lines)
@@ -115,7 +118,12 @@ class Fabric:
 
     @classmethod
     def load(
-        cls, card: str | Path, *, variant: str = "", override: Mapping[str, Any] | None = None, near: Path | None = None
+        cls,
+        card: str | Path,
+        *,
+        variant: str = "",
+        override: Mapping[str, Any] | None = None,
+        near: Path | None = None,
     ) -> Fabric:
         """Read a card by shipped name or file.
 
@@ -126,7 +134,8 @@ class Fabric:
         variant
             Name of a tension variant of the card; empty for the card's own laws.
         override
-            Tables merged over the card's, e.g. ``{"fabric": {"thickness_mm": 0.3}}``; a table with a ``law`` replaces.
+            Tables merged over the card's, e.g. ``{"fabric": {"thickness_mm": 0.3}}``; a table with a ``law``
+            replaces.
 
         Raises
         ------
@@ -252,7 +261,8 @@ class Fabric:
         Raises
         ------
         CardError
-            Tension that does not rise over its validity, or a shear modulus that is negative within its validity.
+            Tension that does not rise over its validity, or a shear modulus that is negative within its
+            validity.
         """
         tensions: tuple[tuple[Direction, TensionLaw], ...] = (("warp", self.warp), ("weft", self.weft))
         for direction, tension in tensions:
@@ -262,13 +272,14 @@ class Fabric:
             fall = first_fall(law, upper)
             if fall is not None:
                 raise CardError(
-                    f"the tension law of the {direction} is not monotone: the force falls between {fall.start:.3g} and "
-                    f"{fall.end:.3g} mm",
+                    f"the tension law of the {direction} is not monotone: the force falls between "
+                    f"{fall.start:.3g} and {fall.end:.3g} mm",
                     key=key,
                     expected=f"a force that rises over 0-{upper:.3g} mm",
                     got=f"F({fall.start:.3g} mm) = {float(law.value(fall.start)):.4g} N, "
                     f"F({upper:.3g} mm) = {float(law.value(upper)):.4g} N",
-                    hint="a yarn that softens is unstable; refit the law, or end its validity before the fall",
+                    hint="a yarn that softens is unstable; refit the law, or end its validity before "
+                    "the fall",
                 )
             if float(law.value(0.0)) != 0.0:
                 raise CardError(
@@ -282,7 +293,8 @@ class Fabric:
         fall = first_fall(shear.stress, shear.valid_to)
         if fall is not None:
             raise CardError(
-                f"the shear modulus is negative between {np.degrees(fall.start):.3g} and {np.degrees(fall.end):.3g} degrees",
+                f"the shear modulus is negative between {np.degrees(fall.start):.3g} and "
+                f"{np.degrees(fall.end):.3g} degrees",
                 key="shear",
                 expected=f"G12 >= 0 over 0-{np.degrees(shear.valid_to):.3g} degrees",
                 got=f"G12 = {fall.steepest_fall:.4g} MPa at the worst",

@@ -153,7 +153,8 @@ def integrate_fibre_frames(
     turned = np.flatnonzero(kept < SMALLEST_MIDPOINT)
     if turned.size:
         raise ValueError(
-            f"step {turned[0]} is too large: the mean of its two gradients has almost no area; give more steps"
+            f"step {turned[0]} is too large: the mean of its two gradients has almost no area; "
+            "give more steps"
         )
 
     velocity = (path - before) @ np.linalg.inv(middle)

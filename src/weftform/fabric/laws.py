@@ -1,8 +1,8 @@
 """Laws: a number in, a number out, with its derivative and its range of validity.
 
-A law knows nothing of yarns or cells. It is a function on ``x >= 0`` that starts at zero; beyond ``valid_to`` it goes on in a
-straight line (a polynomial fitted to a test says nothing there, and may turn over). Laws compose: :class:`Scaled`,
-:class:`Sum`.
+A law knows nothing of yarns or cells. It is a function on ``x >= 0`` that starts at zero; beyond
+``valid_to`` it goes on in a straight line (a polynomial fitted to a test says nothing there, and may turn
+over). Laws compose: :class:`Scaled`, :class:`Sum`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _straight_beyond(
 
 @dataclass(frozen=True)
 class PolynomialLaw:
-    """``sum_k c_k x^k`` for ``k = 1, 2, ...``; ``constant`` is added everywhere and is zero unless asked for."""
+    """``sum_k c_k x^k`` for ``k = 1, 2, ...``; ``constant`` is added and is zero unless asked for."""
 
     coefficients: tuple[float, ...]
     valid_to: float
@@ -76,7 +76,7 @@ class LinearLaw:
 
 @dataclass(frozen=True)
 class LogStrainLaw:
-    """``stiffness * length * ln(1 + x / length)``: linear in the logarithmic strain of a specimen of that length."""
+    """``stiffness * length * ln(1 + x / length)``: linear in the specimen's logarithmic strain."""
 
     stiffness: float
     length: float
@@ -91,7 +91,7 @@ class LogStrainLaw:
 
 @dataclass(frozen=True)
 class TabulatedLaw:
-    """Monotone cubic interpolation (Fritsch and Carlson 1980, PCHIP) through points; the first point is the origin."""
+    """Monotone cubic interpolation (Fritsch and Carlson 1980, PCHIP) through points, from the origin."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]
@@ -154,7 +154,9 @@ class Scaled:
         return np.asarray(self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x))
 
     def slope(self, x: Floats | float) -> Floats:
-        return np.asarray(self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x))
+        return np.asarray(
+            self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x)
+        )
 
 
 @dataclass(frozen=True)

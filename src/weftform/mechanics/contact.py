@@ -1,9 +1,11 @@
 """Contact of a point of the fabric with a rigid tool: signed distance, penalty, Coulomb friction.
 
-One shape covers the analytic tools: the *rounded edge*. In the half plane ``(s, z)``, with ``s`` the distance to the axis of the
-tool, a tool is the set of points within ``radius`` of the quadrant ``u <= 0, w <= 0`` where ``u = +-(s - s0)`` and ``w = +-(z - z0)``.
+One shape covers the analytic tools: the *rounded edge*. In the half plane ``(s, z)``, with ``s`` the
+distance to the axis of the tool, a tool is the set of points within ``radius`` of the quadrant ``u <= 0,
+w <= 0`` where ``u = +-(s - s0)`` and ``w = +-(z - z0)``.
 
-- punch: ``u = s - 0``, a quarter circle that meets the axis: a hemisphere with its shank; ``s0 > 0`` a flat-bottomed punch;
+- punch: ``u = s - 0``, a quarter circle that meets the axis: a hemisphere with its shank; ``s0 > 0`` a
+  flat-bottomed punch;
 - die: ``u = s0 - s``: a flat face, a fillet and the wall of the hole;
 - blank-holder: the same turned over, usually with a small edge radius.
 """
@@ -38,10 +40,13 @@ def rounded_edge(
 
 
 @scalar
-def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
+def coulomb(
+    trial_x: float, trial_y: float, trial_z: float, limit: float
+) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
-    Returns the three components and the excess that was cut off [N]: excess / tangential stiffness is the slip.
+    Returns the three components and the excess that was cut off [N]: excess / tangential stiffness is the
+    slip.
     """
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))

@@ -1,7 +1,7 @@
 """A material law as the time loop sees it: polynomial pieces of equal width, linear beyond the end.
 
-Every law of ``weftform.fabric`` reduces to this form. A polynomial law is one piece and needs no look-up; tabulated
-and logarithmic laws are many cubic pieces.
+Every law of ``weftform.fabric`` reduces to this form. A polynomial law is one piece and needs no look-up;
+tabulated and logarithmic laws are many cubic pieces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 
 @scalar
 def polynomial(coefficients: Any, x: float) -> float:
-    """Polynomial value, highest power first. From a tuple the loop unrolls: its length is part of its type."""
+    """Polynomial value, highest power first. The loop over a tuple unrolls: its type has a length."""
     value: float = coefficients[0]
     for k in range(1, len(coefficients)):
         value = value * x + coefficients[k]
@@ -30,7 +30,9 @@ def polynomial(coefficients: Any, x: float) -> float:
 
 
 @scalar
-def piecewise_value(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float) -> float:
+def piecewise_value(
+    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
+) -> float:
     """Value at ``x >= 0`` of a law with ``pieces`` polynomials of equal ``width``, linear beyond the last."""
     end = width * pieces
     inside = min(x, end)
@@ -42,7 +44,9 @@ def piecewise_value(coefficients: Any, degree: int, pieces: int, width: float, e
 
 
 @scalar
-def piecewise_slope(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float) -> float:
+def piecewise_slope(
+    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
+) -> float:
     """Derivative of :func:`piecewise_value`."""
     end = width * pieces
     if x >= end:
@@ -60,7 +64,7 @@ def piecewise_slope(coefficients: Any, degree: int, pieces: int, width: float, e
 def piecewise_integral(
     coefficients: Any, integrals: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
 ) -> float:
-    """Integral from 0 to ``x`` of :func:`piecewise_value`; ``integrals[p]`` is the integral up to piece ``p``."""
+    """Integral from 0 to ``x`` of :func:`piecewise_value`; ``integrals[p]`` is that up to piece ``p``."""
     end = width * pieces
     inside = min(x, end)
     piece = min(int(inside / width), pieces - 1)
