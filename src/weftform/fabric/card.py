@@ -31,8 +31,9 @@ class FabricTable(Declared):
 class TensionTable(Declared):
     """Force against elongation of a tensile specimen, F [N] of u [mm].
 
-    ``polynomial``: ``coefficients`` of u, u^2, ... and ``valid_to_mm``; ``linear`` and ``log-strain``: ``stiffness_N_per_mm``;
-    ``tabulated``: ``displacement_mm`` and ``force_N``. ``same_as`` copies the other direction.
+    ``polynomial``: ``coefficients`` of u, u^2, ... and ``valid_to_mm``; ``linear`` and ``log-strain``:
+    ``stiffness_N_per_mm``; ``tabulated``: ``displacement_mm`` and ``force_N``. ``same_as`` copies the other
+    direction.
     """
 
     law: Literal["polynomial", "linear", "log-strain", "tabulated"] | None = None
@@ -95,7 +96,8 @@ class ShearTable(Declared):
     """In-plane shear, one of three quantities, against the shear angle.
 
     ``shear-modulus``: G12 [MPa], polynomial with its constant first; ``shear-stress``: tau [MPa] and
-    ``normalised-shear-force``: F_sh [N/mm], polynomials of gamma, gamma^2, ... Angles of polynomials in radians, of tables in degrees.
+    ``normalised-shear-force``: F_sh [N/mm], polynomials of gamma, gamma^2, ... Angles of polynomials in
+    radians, of tables in degrees.
     """
 
     law: Literal["polynomial", "constant", "tabulated"]
@@ -121,6 +123,10 @@ class ShearTable(Declared):
             raise ValueError('law "constant" gives a shear modulus')
         if self.law == "tabulated" and self.quantity == "shear-modulus":
             raise ValueError("a tabulated shear law is of shear-stress or normalised-shear-force")
+        if self.law == "tabulated" and "valid_to_deg" in self.model_fields_set:
+            raise ValueError("a tabulated shear law is valid to its last point: leave out valid_to_deg")
+        if self.law == "tabulated" and self.shear_angle_deg and max(self.shear_angle_deg) > 90.0:
+            raise ValueError("shear angles of a table must not exceed 90 degrees")
         return self
 
 

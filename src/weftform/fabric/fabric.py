@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -11,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from weftform.declared import read_toml, validated
+from weftform.declared import line_of, read_toml, validated
 from weftform.errors import CardError
 from weftform.fabric.card import FabricCard, TensionPair, TensionTable
 from weftform.fabric.laws import (
@@ -28,7 +29,7 @@ from weftform.fabric.laws import (
 Direction = Literal["warp", "weft"]
 
 MOST_STRETCH = 2.0
-"""Largest nominal strain covered by the packed pieces of a law that has no limit of validity (element tests reach 1)."""
+"""Largest nominal strain covered by the packed pieces of a law without a limit (element tests reach 1)."""
 
 
 def shipped_cards() -> dict[str, Path]:
@@ -61,8 +62,9 @@ class TensionLaw:
     def line_law(self, spacing: float) -> Law:
         """Force [N] of one line of connectors against nominal strain, for lines ``spacing`` mm apart.
 
-        Eq. 11: the specimen is n + 1 = width / spacing + 1 lines in parallel (fractional values are meant), each a chain of
-        length / l0 connectors that share the elongation. Written in the strain u / length, l0 along the line drops out.
+        Eq. 11: the specimen is n + 1 = width / spacing + 1 lines in parallel (fractional values are meant),
+        each a chain of length / l0 connectors that share the elongation. Written in the strain u / length,
+        l0 along the line drops out.
         """
         lines = self.width / spacing + 1.0
         return Scaled(self.specimen_force, factor_x=self.length, factor_y=1.0 / lines)
@@ -71,7 +73,7 @@ class TensionLaw:
         """Force of the specimen [N] at an elongation [mm], slack included."""
         u = np.asarray(elongation, float)
         push = self.slack_ratio * self.specimen_force.slope(0.0) * np.minimum(u, 0.0)
-        return self.specimen_force.value(np.maximum(u, 0.0)) + push
+        return np.asarray(self.specimen_force.value(np.maximum(u, 0.0)) + push)
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,8 @@ class Fabric:
         variant
             Name of a tension variant of the card; empty for the card's own laws.
         override
-            Tables merged over the card's, e.g. ``{"fabric": {"thickness_mm": 0.3}}``; a table with a ``law`` replaces.
+            Tables merged over the card's, e.g. ``{"fabric": {"thickness_mm": 0.3}}``; a table with a ``law``
+            replaces.
 
         Raises
         ------
@@ -165,6 +168,7 @@ class Fabric:
             raise CardError(
                 problem.message,
                 file=problem.file,
+                line=line_of(text, tuple(problem.key.split("."))) if problem.key else None,
                 key=problem.key,
                 expected=problem.expected,
                 got=problem.got,
@@ -201,8 +205,12 @@ class Fabric:
         pair = self._pair()
         table: TensionTable = getattr(pair, direction)
         if table.same_as is not None:
-            table = getattr(pair, table.same_as)
-        return _tension_law(table)
+            direction, table = table.same_as, getattr(pair, table.same_as)
+        with _errors_at(self._tension_key(direction)):
+            return _tension_law(table)
+
+    def _tension_key(self, direction: Direction) -> str:
+        return f"tension.{f'variants.{self.variant}.' if self.variant else ''}{direction}"
 
     @cached_property
     def warp(self) -> TensionLaw:
@@ -232,7 +240,8 @@ class Fabric:
             law = PolynomialLaw(tuple(powers), end)
         else:
             assert table.shear_angle_deg is not None and table.values is not None
-            law = TabulatedLaw(tuple(np.radians(table.shear_angle_deg)), tuple(table.values))
+            with _errors_at("shear"):
+                law = Scaled(TabulatedLaw(tuple(table.shear_angle_deg), tuple(table.values)), np.degrees(1.0))
             end = law.valid_to
         return ShearLaw(Scaled(law, factor_y=per_thickness), end)
 
@@ -252,22 +261,25 @@ class Fabric:
         Raises
         ------
         CardError
-            Tension that does not rise over its validity, or a shear modulus that is negative within its validity.
+            Tension that does not rise over its validity, or a shear modulus that is negative within its
+            validity.
         """
-        for direction, tension in (("warp", self.warp), ("weft", self.weft)):
+        tensions: tuple[tuple[Direction, TensionLaw], ...] = (("warp", self.warp), ("weft", self.weft))
+        for direction, tension in tensions:
             law = tension.specimen_force
-            key = f"tension.{f'variants.{self.variant}.' if self.variant else ''}{direction}"
+            key = self._tension_key(direction)
             upper = law.valid_to if np.isfinite(law.valid_to) else MOST_STRETCH * tension.length
             fall = first_fall(law, upper)
             if fall is not None:
                 raise CardError(
-                    f"the tension law of the {direction} is not monotone: the force falls between {fall.start:.3g} and "
-                    f"{fall.end:.3g} mm",
+                    f"the tension law of the {direction} is not monotone: the force falls between "
+                    f"{fall.start:.3g} and {fall.end:.3g} mm",
                     key=key,
                     expected=f"a force that rises over 0-{upper:.3g} mm",
                     got=f"F({fall.start:.3g} mm) = {float(law.value(fall.start)):.4g} N, "
                     f"F({upper:.3g} mm) = {float(law.value(upper)):.4g} N",
-                    hint="a yarn that softens is unstable; refit the law, or end its validity before the fall",
+                    hint="a yarn that softens is unstable; refit the law, or end its validity before "
+                    "the fall",
                 )
             if float(law.value(0.0)) != 0.0:
                 raise CardError(
@@ -281,7 +293,8 @@ class Fabric:
         fall = first_fall(shear.stress, shear.valid_to)
         if fall is not None:
             raise CardError(
-                f"the shear modulus is negative between {np.degrees(fall.start):.3g} and {np.degrees(fall.end):.3g} degrees",
+                f"the shear modulus is negative between {np.degrees(fall.start):.3g} and "
+                f"{np.degrees(fall.end):.3g} degrees",
                 key="shear",
                 expected=f"G12 >= 0 over 0-{np.degrees(shear.valid_to):.3g} degrees",
                 got=f"G12 = {fall.steepest_fall:.4g} MPa at the worst",
@@ -289,12 +302,23 @@ class Fabric:
             )
 
 
+@contextmanager
+def _errors_at(key: str) -> Iterator[None]:
+    """Name the place of an error that a law raises, which knows no card."""
+    try:
+        yield
+    except CardError as problem:
+        raise CardError(
+            problem.message, key=key, expected=problem.expected, got=problem.got, hint=problem.hint
+        ) from None
+
+
 def merge_tables(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge nested tables; a table that brings its own ``law`` replaces the one it stands for."""
+    """Merge nested tables; one that brings its own ``law`` or ``same_as`` replaces the one it stands for."""
     merged = dict(base)
     for key, value in over.items():
         old = merged.get(key)
-        if isinstance(value, Mapping) and isinstance(old, Mapping) and "law" not in value:
+        if isinstance(value, Mapping) and isinstance(old, Mapping) and not {"law", "same_as"} & value.keys():
             merged[key] = merge_tables(old, value)
         else:
             merged[key] = dict(value) if isinstance(value, Mapping) else value

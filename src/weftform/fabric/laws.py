@@ -1,8 +1,8 @@
 """Laws: a number in, a number out, with its derivative and its range of validity.
 
-A law knows nothing of yarns or cells. It is a function on ``x >= 0`` that starts at zero; beyond ``valid_to`` it goes on in a
-straight line (a polynomial fitted to a test says nothing there, and may turn over). Laws compose: :class:`Scaled`,
-:class:`Sum`.
+A law knows nothing of yarns or cells. It is a function on ``x >= 0`` that starts at zero; beyond
+``valid_to`` it goes on in a straight line (a polynomial fitted to a test says nothing there, and may turn
+over). Laws compose: :class:`Scaled`, :class:`Sum`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Law(Protocol):
 
 
 def _straight_beyond(
-    x: Floats | float, valid_to: float, inner: Floats, at_end: Floats, end_slope: Floats
+    x: Floats | float, valid_to: float, inner: Floats, at_end: Floats | float, end_slope: Floats | float
 ) -> Floats:
     x = np.asarray(x, dtype=float)
     return np.where(x > valid_to, at_end + end_slope * (x - valid_to), inner)
@@ -42,7 +42,7 @@ def _straight_beyond(
 
 @dataclass(frozen=True)
 class PolynomialLaw:
-    """``sum_k c_k x^k`` for ``k = 1, 2, ...``; ``constant`` is added everywhere and is zero unless asked for."""
+    """``sum_k c_k x^k`` for ``k = 1, 2, ...``; ``constant`` is added and is zero unless asked for."""
 
     coefficients: tuple[float, ...]
     valid_to: float
@@ -76,7 +76,7 @@ class LinearLaw:
 
 @dataclass(frozen=True)
 class LogStrainLaw:
-    """``stiffness * length * ln(1 + x / length)``: linear in the logarithmic strain of a specimen of that length."""
+    """``stiffness * length * ln(1 + x / length)``: linear in the specimen's logarithmic strain."""
 
     stiffness: float
     length: float
@@ -91,7 +91,7 @@ class LogStrainLaw:
 
 @dataclass(frozen=True)
 class TabulatedLaw:
-    """Monotone cubic interpolation (Fritsch and Carlson 1980, PCHIP) through points; the first point is the origin."""
+    """Monotone cubic interpolation (Fritsch and Carlson 1980, PCHIP) through points, from the origin."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]
@@ -151,10 +151,12 @@ class Scaled:
         return self.law.valid_to / self.factor_x
 
     def value(self, x: Floats | float) -> Floats:
-        return self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x)
+        return np.asarray(self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x))
 
     def slope(self, x: Floats | float) -> Floats:
-        return self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x)
+        return np.asarray(
+            self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x)
+        )
 
 
 @dataclass(frozen=True)
@@ -165,14 +167,19 @@ class Sum:
 
     @property
     def valid_to(self) -> float:
-        finite = [law.valid_to for law in self.laws if np.isfinite(law.valid_to)]
-        return max(finite) if finite else np.inf
+        return max((law.valid_to for law in self.laws if not _is_straight(law)), default=np.inf)
 
     def value(self, x: Floats | float) -> Floats:
-        return np.sum([law.value(x) for law in self.laws], axis=0)
+        return np.asarray(np.sum([law.value(x) for law in self.laws], axis=0))
 
     def slope(self, x: Floats | float) -> Floats:
-        return np.sum([law.slope(x) for law in self.laws], axis=0)
+        return np.asarray(np.sum([law.slope(x) for law in self.laws], axis=0))
+
+
+def _is_straight(law: Law) -> bool:
+    while isinstance(law, Scaled):
+        law = law.law
+    return isinstance(law, LinearLaw) or (isinstance(law, Sum) and all(map(_is_straight, law.laws)))
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from weftform.fabric.laws import Floats, Law, LinearLaw, PolynomialLaw, Scaled
 
 TABLE_PIECES = 1024
-"""Pieces of a law that is no polynomial: cubic Hermite, so the error falls with the fourth power of their width."""
+"""Pieces of a law that is no polynomial: cubic Hermite, of fourth order for a smooth law."""
 
 SHEAR_FIT_TOLERANCE = 1.0e-8
-"""Largest error of the polynomial in ``tan(gamma / 2)``, relative to the law's largest stress over the fitted range."""
+"""Largest error of the polynomial in ``tan(gamma / 2)``, relative to the largest ``tau / tan(gamma / 2)``."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def pack_polynomial(powers: Floats, end: float) -> PiecewiseLaw:
 
 
 def pack_law(law: Law, end: float) -> PiecewiseLaw:
-    """Pack a law for ``0 <= x``; exact for (scaled) polynomial and linear laws, cubic Hermite pieces for others.
+    """Pack a law for ``0 <= x``: exactly if it is a (scaled) polynomial or line, else in cubic pieces.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def pack_law(law: Law, end: float) -> PiecewiseLaw:
         return pack_polynomial(scale_y * powers, inner.valid_to / scale_x)
     from scipy.interpolate import CubicHermiteSpline
 
-    x = np.linspace(0.0, min(end, law.valid_to), TABLE_PIECES + 1)
+    x = np.linspace(0.0, law.valid_to if np.isfinite(law.valid_to) else end, TABLE_PIECES + 1)
     spline = CubicHermiteSpline(x, law.value(x), law.slope(x))
     antiderivative = spline.antiderivative()
     return PiecewiseLaw(
@@ -92,8 +92,9 @@ def pack_law(law: Law, end: float) -> PiecewiseLaw:
 def pack_shear(stress: Law) -> PiecewiseLaw:
     """Pack ``tau / t`` as a function of ``t = tan(gamma / 2)`` on 0..1 (shear angles 0..90 degrees).
 
-    A smooth law becomes one polynomial, of the lowest degree that keeps the error below :data:`SHEAR_FIT_TOLERANCE`; a law that
-    no polynomial follows so closely (tabulated points) becomes cubic pieces.
+    A smooth law becomes one polynomial, of the lowest degree that keeps the error below
+    :data:`SHEAR_FIT_TOLERANCE`; a law that no polynomial follows so closely (tabulated points) becomes cubic
+    pieces.
     """
     nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(400) + 0.5) / 400)
     angle = 2.0 * np.arctan(nodes)

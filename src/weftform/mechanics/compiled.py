@@ -8,13 +8,15 @@ drivers. ``error_model="numpy"`` removes the zero-division branches that stop LL
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 
 FASTMATH = {"contract"}
 
+Scalar = TypeVar("Scalar", bound=Callable[..., Any])
 
-def scalar(function: Callable[..., Any]) -> Any:
+
+def scalar(function: Scalar) -> Scalar:
     """Compile a function of numbers so that it is inlined into the loop that calls it."""
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)(function)
+    return cast(Scalar, numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)(function))

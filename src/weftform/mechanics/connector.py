@@ -1,7 +1,7 @@
 """The yarn between two crossings: a connector with a non-linear force, slack in compression.
 
-The force is a function of the nominal strain (length / initial length - 1); Eq. 11 of the paper, which turns the
-curve of a specimen into that function, belongs to :class:`weftform.fabric.Fabric`.
+The force is a function of the nominal strain (length / initial length - 1); Eq. 11 of the paper, which turns
+the curve of a specimen into that function, belongs to :class:`weftform.fabric.Fabric`.
 """
 
 from __future__ import annotations

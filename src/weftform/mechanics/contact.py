@@ -1,9 +1,11 @@
 """Contact of a point of the fabric with a rigid tool: signed distance, penalty, Coulomb friction.
 
-One shape covers the analytic tools: the *rounded edge*. In the half plane ``(s, z)``, with ``s`` the distance to the axis of the
-tool, a tool is the set of points within ``radius`` of the quadrant ``u <= 0, w <= 0`` where ``u = +-(s - s0)`` and ``w = +-(z - z0)``.
+One shape covers the analytic tools: the *rounded edge*. In the half plane ``(s, z)``, with ``s`` the
+distance to the axis of the tool, a tool is the set of points within ``radius`` of the quadrant ``u <= 0,
+w <= 0`` where ``u = +-(s - s0)`` and ``w = +-(z - z0)``.
 
-- punch: ``u = s - 0``, a quarter circle that meets the axis: a hemisphere with its shank; ``s0 > 0`` a flat-bottomed punch;
+- punch: ``u = s - 0``, a quarter circle that meets the axis: a hemisphere with its shank; ``s0 > 0`` a
+  flat-bottomed punch;
 - die: ``u = s0 - s``: a flat face, a fillet and the wall of the hole;
 - blank-holder: the same turned over, usually with a small edge radius.
 """
@@ -14,7 +16,8 @@ import math
 
 from weftform.mechanics.compiled import scalar
 
-TINY = 1.0e-300
+TINY = 1.0e-150
+"""Smallest length or force that divides; the square of anything above it is a normal number."""
 
 
 @scalar
@@ -28,8 +31,8 @@ def rounded_edge(
     outside_w = max(w, 0.0)
     reach = math.sqrt(outside_u * outside_u + outside_w * outside_w)
     depth = min(max(u, w), 0.0)
-    inverse = 1.0 / max(reach, TINY)
-    deep = 1.0 if depth < 0.0 else 0.0
+    deep = 1.0 if reach < TINY else 0.0
+    inverse = (1.0 - deep) / max(reach, TINY)
     flat = 1.0 if w >= u else 0.0
     normal_u = outside_u * inverse + deep * (1.0 - flat)
     normal_w = outside_w * inverse + deep * flat
@@ -42,7 +45,8 @@ def coulomb(
 ) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
-    Returns the three components and (excess cut off) x (force kept) [N^2]: divided by the tangential stiffness it is the heat.
+    Returns the three components and the product of the excess cut off and the force kept [N^2]: the excess
+    over the tangential stiffness is the slip, so the product over that stiffness is the heat.
     """
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))

@@ -1,10 +1,11 @@
 """The hypoelastic membrane in total form.
 
-The paper accumulates stress increments in two orthonormal frames, one on each yarn direction, and takes the mean of the
-two shears (Eqs. 12-24). For any motion the increments of engineering shear in the two frames are
-``dgamma +- (dln l2 - dln l1) tan(gamma)``, so the mean is exactly ``dgamma`` and the law integrates to a state function of the
-yarn stretches ``l1, l2`` and the shear angle ``gamma``: ``s1 = E1 ln l1``, ``s2 = E2 ln l2``, ``tau = tau(gamma)``. See
-``docs/theory/membrane.md``. Indices 1 and 2 stand for warp and weft in this file's formulas only.
+The paper accumulates stress increments in two orthonormal frames, one on each yarn direction, and takes the
+mean of the two shears (Eqs. 12-24). For any motion the increments of engineering shear in the two frames are
+``dgamma +- (dln l2 - dln l1) tan(gamma)``, so the mean is exactly ``dgamma`` and the law integrates to a
+state function of the yarn stretches ``l1, l2`` and the shear angle ``gamma``: ``s1 = E1 ln l1``,
+``s2 = E2 ln l2``, ``tau = tau(gamma)``. See ``docs/theory/membrane.md``. Indices 1 and 2 stand for warp and
+weft in this file's formulas only.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ SMALLEST_AREA_RATIO = 1.0e-6
 
 @scalar
 def log_stretch(squared_stretch: float, coefficients: Any) -> float:
-    """``ln l`` from ``l**2`` by the odd series in ``y = (l**2 - 1) / (l**2 + 1)``; ``coefficients`` are fitted."""
+    """``ln l`` from ``l**2`` by a fitted series, odd in ``y = (l**2 - 1) / (l**2 + 1)``."""
     y = (squared_stretch - 1.0) / (squared_stretch + 1.0)
     return y * polynomial(coefficients, y * y)
 
@@ -43,9 +44,9 @@ def shear_angle(g11: float, g22: float, g12: float) -> float:
 def shear_stress(
     coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float
 ) -> float:
-    """``tau`` [MPa] as a law in ``t = tan(gamma / 2)``, odd in ``t``. The fitted polynomial is of ``tau / t``."""
+    """``tau`` [MPa] as an odd law in ``t = tan(gamma / 2)``; the fitted polynomial is of ``tau / t``."""
     size = abs(t)
-    return math.copysign(size * piecewise_value(coefficients, degree, pieces, width, end_slope, size), t)
+    return t * piecewise_value(coefficients, degree, pieces, width, end_slope, size)
 
 
 @scalar
@@ -65,9 +66,9 @@ def covariant_forces(
 ) -> tuple[float, float, float]:
     """Coefficients ``a11, a12, a22`` of the forces conjugate to the covariant vectors.
 
-    The force on ``g1`` is ``a11 g1 + a12 g2`` and on ``g2`` ``a12 g1 + a22 g2``. From the power per current volume
-    ``s1 dln l1 + s2 dln l2 + tau dgamma`` with ``J dgamma = dg12 - g12 (dln l1 + dln l2)`` and constant thickness, where
-    ``volume`` is thickness times the initial area.
+    The force on ``g1`` is ``a11 g1 + a12 g2`` and on ``g2`` ``a12 g1 + a22 g2``. From the power per current
+    volume ``s1 dln l1 + s2 dln l2 + tau dgamma`` with ``J dgamma = dg12 - g12 (dln l1 + dln l2)`` and
+    constant thickness, where ``volume`` is thickness times the initial area.
     """
     area = math.sqrt(max(g11 * g22 - g12 * g12, SMALLEST_AREA_RATIO))
     a12 = volume * shear

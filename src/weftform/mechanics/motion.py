@@ -9,10 +9,10 @@ from weftform.mechanics.compiled import scalar
 
 @scalar
 def soft_progress(progress: float, ramp: float) -> float:
-    """Travelled share (0..1) at the time share ``progress``, with constant speed but for ``ramp`` at each end.
+    """Travelled share (0..1) at the time share ``progress``: constant speed but for a ``ramp`` at each end.
 
-    In a ramp the speed follows the smooth step ``3 x^2 - 2 x^3``, so acceleration is continuous and starts from zero;
-    the speed between the ramps is ``1 / (1 - ramp)`` of the mean. ``0 < ramp <= 0.5``.
+    In a ramp the speed follows the smooth step ``3 x^2 - 2 x^3``, so acceleration is continuous and starts
+    from zero; the speed between the ramps is ``1 / (1 - ramp)`` of the mean. ``0 < ramp <= 0.5``.
     """
     peak = 1.0 / (1.0 - ramp)
     if progress <= 0.0:
@@ -31,10 +31,13 @@ def soft_progress(progress: float, ramp: float) -> float:
 @scalar
 def motion_value(times: Any, values: Any, knots: int, ramp: float, time: float) -> float:
     """Value at ``time`` of a motion through ``knots`` points, soft between each pair."""
+    value: float = values[0]
     if time <= times[0]:
-        return values[0]
+        return value
     for k in range(knots - 1):
         if time < times[k + 1]:
             progress = (time - times[k]) / (times[k + 1] - times[k])
-            return values[k] + (values[k + 1] - values[k]) * soft_progress(progress, ramp)
-    return values[knots - 1]
+            value = values[k] + (values[k + 1] - values[k]) * soft_progress(progress, ramp)
+            return value
+    value = values[knots - 1]
+    return value

@@ -1,7 +1,7 @@
 """A material law as the time loop sees it: polynomial pieces of equal width, linear beyond the end.
 
-Every law of ``weftform.fabric`` reduces to this form. A polynomial law is one piece and needs no look-up; tabulated
-and logarithmic laws are many cubic pieces.
+Every law of ``weftform.fabric`` reduces to this form. A polynomial law is one piece and needs no look-up;
+tabulated and logarithmic laws are many cubic pieces.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from weftform.mechanics.compiled import scalar
 @scalar
 def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
     """Polynomial value; ``coefficients[start]`` is the highest power."""
-    value = coefficients[start]
+    value: float = coefficients[start]
     for k in range(1, degree + 1):
         value = value * x + coefficients[start + k]
     return value
@@ -22,8 +22,8 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 
 @scalar
 def polynomial(coefficients: Any, x: float) -> float:
-    """Polynomial value, highest power first. From a tuple the loop unrolls: its length is part of its type."""
-    value = coefficients[0]
+    """Polynomial value, highest power first. The loop over a tuple unrolls: its type has a length."""
+    value: float = coefficients[0]
     for k in range(1, len(coefficients)):
         value = value * x + coefficients[k]
     return value
@@ -64,7 +64,7 @@ def piecewise_slope(
 def piecewise_integral(
     coefficients: Any, integrals: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
 ) -> float:
-    """Integral from 0 to ``x`` of :func:`piecewise_value`; ``integrals[p]`` is the integral up to piece ``p``."""
+    """Integral from 0 to ``x`` of :func:`piecewise_value`; ``integrals[p]`` is that up to piece ``p``."""
     end = width * pieces
     inside = min(x, end)
     piece = min(int(inside / width), pieces - 1)
@@ -73,7 +73,7 @@ def piecewise_integral(
     value = 0.0
     for k in range(degree + 1):
         value = value * local + coefficients[start + k] / (degree + 1 - k)
-    total = integrals[piece] + value * local
+    total: float = integrals[piece] + value * local
     if x > end:
         at_end = horner(coefficients, degree, (pieces - 1) * (degree + 1), width)
         total += (x - end) * (at_end + 0.5 * end_slope * (x - end))

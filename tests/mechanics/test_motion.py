@@ -1,0 +1,83 @@
+"""Prescribed motions: they arrive, never turn back, and start and stop softly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from weftform.mechanics.motion import motion_value, soft_progress
+
+ramps = st.floats(0.01, 0.5)
+examples = settings(deadline=None, derandomize=True, max_examples=40)
+
+
+def speed(progress, ramp, step=1e-6):
+    return (soft_progress(progress + step, ramp) - soft_progress(progress - step, ramp)) / (2 * step)
+
+
+@examples
+@given(ramps)
+def test_goes_from_nought_to_one_without_turning_back(ramp):
+    travelled = np.array([soft_progress(p, ramp) for p in np.linspace(-0.1, 1.1, 601)])
+    assert travelled[0] == 0.0 and travelled[-1] == 1.0
+    assert soft_progress(0.0, ramp) == 0.0 and soft_progress(1.0, ramp) == 1.0
+    # Rounding where it stands still.
+    assert (np.diff(travelled) >= -1e-15).all()
+
+
+@examples
+@given(ramps, st.floats(0.0, 1.0))
+def test_second_half_mirrors_the_first(ramp, progress):
+    forth, back = soft_progress(progress, ramp), soft_progress(1.0 - progress, ramp)
+    assert forth + back == pytest.approx(1.0, abs=1e-14)
+
+
+@examples
+@given(ramps, st.floats(0.0, 1.0))
+def test_speed_is_that_of_the_smooth_step(ramp, progress):
+    """1 / (1 - ramp) in the middle, times 3 x^2 - 2 x^3 in the ramps: so it is continuous and starts from
+    rest."""
+    x = min(progress, 1.0 - progress) / ramp
+    share = 3 * x**2 - 2 * x**3 if x < 1.0 else 1.0
+    # Central differences: rounding 1e-16 / 1e-6; the third derivative reaches 12 / 0.01^2 and jumps at the
+    # joints, where the second derivative is zero on both sides, so truncation is below 1e-12 * 1e5.
+    assert speed(progress, ramp) == pytest.approx(share / (1.0 - ramp), abs=1e-6)
+
+
+@pytest.mark.parametrize("ramp", [0.01, 0.1, 0.3, 0.5])
+def test_speed_and_acceleration_do_not_jump_at_the_joints(ramp):
+    for joint in (0.0, ramp, 1.0 - ramp, 1.0):
+        gap = 1e-4 * ramp
+        # Over the gap 2e-4 of a ramp, from the flat end of the smooth step: 6 x^2 / 2 of the speed, x = 1e-4.
+        assert abs(speed(joint + gap, ramp, gap / 10) - speed(joint - gap, ramp, gap / 10)) < 1e-6
+        # The acceleration is 6 x / ramp there, peak 2: below 12e-4 / ramp.
+        turn = (speed(joint + gap, ramp, gap) - speed(joint - gap, ramp, gap)) / (2 * gap)
+        assert abs(turn) < 12e-4 / ramp
+
+
+TIMES, VALUES = np.array([0.0, 2.0, 3.0, 5.0]), np.array([1.0, 4.0, 4.0, -2.0])
+
+
+def value(time, ramp=0.2):
+    return motion_value(TIMES, VALUES, 4, ramp, time)
+
+
+def test_passes_through_its_knots_and_stays_at_the_ends():
+    for time, expected in zip(TIMES, VALUES, strict=True):
+        assert value(time) == pytest.approx(expected, rel=1e-15)
+    assert value(-1.0) == 1.0 and value(9.0) == -2.0
+
+
+def test_a_plateau_stays_flat_and_each_leg_is_monotone():
+    assert {value(t) for t in np.linspace(2.0, 3.0, 21)} == {4.0}
+    assert (np.diff([value(t) for t in np.linspace(0.0, 2.0, 101)]) >= 0.0).all()
+    assert (np.diff([value(t) for t in np.linspace(3.0, 5.0, 101)]) <= 0.0).all()
+
+
+def test_stands_still_at_every_knot():
+    for time in TIMES:
+        step = 1e-5
+        # Within the first 1e-5 of a leg of 1 s or more the way is 6 mm times x^3 / ramp^2: below 1e-13 mm.
+        assert abs(value(time + step) - value(time - step)) / (2 * step) < 1e-7
