@@ -45,10 +45,10 @@ def coulomb(
 ) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
-    Returns the three components and the product of the excess cut off and the force kept [N^2]: the excess
-    over the tangential stiffness is the slip, so the product over that stiffness is the heat.
+    Returns the three components and half the drop of the squared force [N^2]: over the tangential stiffness
+    it is the energy that the spring loses to the slip, so work = stored energy + heat holds exactly.
     """
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))
     kept = share * size
-    return share * trial_x, share * trial_y, share * trial_z, (size - kept) * kept
+    return share * trial_x, share * trial_y, share * trial_z, 0.5 * (size * size - kept * kept)
