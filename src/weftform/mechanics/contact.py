@@ -51,4 +51,4 @@ def coulomb(
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))
     kept = share * size
-    return share * trial_x, share * trial_y, share * trial_z, 0.5 * (size * size - kept * kept)
+    return share * trial_x, share * trial_y, share * trial_z, 0.5 * (size - kept) * (size + kept)
