@@ -152,9 +152,7 @@ def test_frames_of_the_end_of_the_step_are_first_order():
 
 
 smooth = st.lists(st.floats(-0.15, 0.15), min_size=8, max_size=8).map(lambda v: np.reshape(v, (4, 2)))
-ends = st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)).map(
-    np.array
-)
+ends = st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-0.8, 0.8), st.floats(-3.0, 3.0)).map(np.array)
 
 
 def wandering(end, detour):
@@ -173,13 +171,9 @@ def wandering(end, detour):
 @given(ends, smooth, smooth)
 def test_stress_does_not_depend_on_the_path(end, detour, other_detour):
     exact = total_form(gradients(*end[:, None])[0], *MODULI)
-    exact = np.array(
-        [exact.warp_stress / MODULI[0], exact.weft_stress / MODULI[1], exact.shear_stress / MODULI[2]]
-    )
+    exact = np.array([exact.warp_stress / MODULI[0], exact.weft_stress / MODULI[1], exact.shear_stress / MODULI[2]])
     for way in (detour, other_detour):
-        assert_converges(
-            wandering(end, way), exact, lambda path: state_vector(integrate_fibre_frames(path, *MODULI))
-        )
+        assert_converges(wandering(end, way), exact, lambda path: state_vector(integrate_fibre_frames(path, *MODULI)))
 
 
 @settings(deadline=None, derandomize=True, max_examples=30)

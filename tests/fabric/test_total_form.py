@@ -25,9 +25,7 @@ def turn(angle: float) -> np.ndarray:
 
 def gradient(warp_stretch, weft_stretch, shear_angle, rigid_turn=0.0) -> np.ndarray:
     """Columns: the warp along x, the weft closed onto it by the shear angle, both turned."""
-    sheared = np.array(
-        [[warp_stretch, weft_stretch * np.sin(shear_angle)], [0.0, weft_stretch * np.cos(shear_angle)]]
-    )
+    sheared = np.array([[warp_stretch, weft_stretch * np.sin(shear_angle)], [0.0, weft_stretch * np.cos(shear_angle)]])
     return turn(rigid_turn) @ sheared
 
 

@@ -110,9 +110,7 @@ def test_square_cell_pulled_on_its_diagonal(degrees, newton):
     law = pack_shear(fabric.shear.stress)
     c, s = math.cos(angle / 2), math.sin(angle / 2)
     f, rate = np.array([[c, s], [s, c]]), 0.5 * np.array([[-s, c], [c, -s]])
-    tau = shear_stress(
-        law.coefficients, law.degree, law.pieces, law.width, law.end_slope, half_tangent(*metric(f))
-    )
+    tau = shear_stress(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, half_tangent(*metric(f)))
     a11, a12, a22 = covariant_forces(VOLUME, *metric(f), 0.0, 0.0, tau)
     pulls = np.column_stack([a11 * f[:, 0] + a12 * f[:, 1], a12 * f[:, 0] + a22 * f[:, 1]])
     force = np.sum(pulls * rate) / (2.69 * math.sin(math.pi / 4 - angle / 2))

@@ -153,9 +153,7 @@ class YarnGrid:
         """Flat area that belongs to each crossing [mm2], shape [rows, columns]; 0 outside the blank."""
         area = np.zeros(self.shape)
         for corner, (di, dj) in enumerate(CORNERS):
-            share = np.where(
-                self.cells == Cell.WHOLE, 0.25, np.where(self.cells == Cell.ABSENT, 0.0, 1.0 / 6.0)
-            )
+            share = np.where(self.cells == Cell.WHOLE, 0.25, np.where(self.cells == Cell.ABSENT, 0.0, 1.0 / 6.0))
             for kind, lacked in LACKED.items():
                 if lacked == corner:
                     share = np.where(self.cells == kind, 0.0, share)

@@ -61,7 +61,7 @@ class Series:
         root["Connectivity"] = connectivity.astype(np.int64)
         root["Offsets"] = offsets.astype(np.int64)
         root["Types"] = np.where(np.diff(offsets) == 3, TRIANGLE, QUAD).astype(np.uint8)
-        self._growing(root, "Points", 3)
+        self._growing(root, "Points", 3, points)
         root.create_group("PointData")
         root.create_group("CellData")
         steps = root.create_group("Steps")
@@ -86,12 +86,11 @@ class Series:
         self.close()
 
     @staticmethod
-    def _growing(group: Any, name: str, components: int) -> Any:
+    def _growing(group: Any, name: str, components: int, rows: int) -> Any:
+        """A dataset that grows along its first axis, one chunk per step."""
         shape = (0,) if components == 1 else (0, components)
-        maxshape = (None,) if components == 1 else (None, components)
-        chunk = (4096,) if components == 1 else (4096, components)
-        return group.create_dataset(name, shape, np.float64, maxshape=maxshape, chunks=chunk, compression="gzip",
-                                    compression_opts=1, shuffle=True)  # fmt: skip
+        chunk = (max(rows, 1), *shape[1:])
+        return group.create_dataset(name, shape, np.float64, maxshape=(None, *shape[1:]), chunks=chunk)
 
     @property
     def steps(self) -> int:
@@ -114,10 +113,8 @@ class Series:
         for kind, fields in (("PointData", point_data), ("CellData", cell_data)):
             for name, values in fields.items():
                 if name not in root[kind]:
-                    self._growing(root[kind], name, 1 if values.ndim == 1 else values.shape[1])
-                    steps[f"{kind}Offsets"].create_dataset(
-                        name, (0,), np.int64, maxshape=(None,), chunks=(64,)
-                    )
+                    self._growing(root[kind], name, 1 if values.ndim == 1 else values.shape[1], len(values))
+                    steps[f"{kind}Offsets"].create_dataset(name, (0,), np.int64, maxshape=(None,), chunks=(64,))
                 _extend(steps[f"{kind}Offsets"][name], np.array([root[kind][name].shape[0]]))
                 _extend(root[kind][name], values)
         _extend(steps["Values"], np.array([time]))

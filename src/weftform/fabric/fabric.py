@@ -35,9 +35,7 @@ MOST_STRETCH = 2.0
 def shipped_cards() -> dict[str, Path]:
     """Names and files of the cards in the package."""
     folder = resources.files("weftform") / "data" / "cards"
-    return {
-        p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)
-    }
+    return {p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)}
 
 
 @dataclass(frozen=True)
@@ -278,8 +276,7 @@ class Fabric:
                     expected=f"a force that rises over 0-{upper:.3g} mm",
                     got=f"F({fall.start:.3g} mm) = {float(law.value(fall.start)):.4g} N, "
                     f"F({upper:.3g} mm) = {float(law.value(upper)):.4g} N",
-                    hint="a yarn that softens is unstable; refit the law, or end its validity before "
-                    "the fall",
+                    hint="a yarn that softens is unstable; refit the law, or end its validity before the fall",
                 )
             if float(law.value(0.0)) != 0.0:
                 raise CardError(

@@ -86,9 +86,7 @@ def polar_rotation(deformation_gradient: Floats) -> Floats:
     definite there when the determinant of F is positive.
     """
     gradient = np.asarray(deformation_gradient, dtype=float)
-    return _rotation(
-        np.arctan2(gradient[..., 1, 0] - gradient[..., 0, 1], gradient[..., 0, 0] + gradient[..., 1, 1])
-    )
+    return _rotation(np.arctan2(gradient[..., 1, 0] - gradient[..., 0, 1], gradient[..., 0, 0] + gradient[..., 1, 1]))
 
 
 def _rotation(angle: Floats) -> Floats:
@@ -153,8 +151,7 @@ def integrate_fibre_frames(
     turned = np.flatnonzero(kept < SMALLEST_MIDPOINT)
     if turned.size:
         raise ValueError(
-            f"step {turned[0]} is too large: the mean of its two gradients has almost no area; "
-            "give more steps"
+            f"step {turned[0]} is too large: the mean of its two gradients has almost no area; give more steps"
         )
 
     velocity = (path - before) @ np.linalg.inv(middle)

@@ -154,9 +154,7 @@ class Scaled:
         return np.asarray(self.factor_y * self.law.value(np.asarray(x, float) * self.factor_x))
 
     def slope(self, x: Floats | float) -> Floats:
-        return np.asarray(
-            self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x)
-        )
+        return np.asarray(self.factor_y * self.factor_x * self.law.slope(np.asarray(x, float) * self.factor_x))
 
 
 @dataclass(frozen=True)

@@ -160,8 +160,7 @@ def stress_tensor(
     warp_frame = np.stack([warp_direction, _quarter_turn(warp_direction)], axis=-1)
     weft_frame = np.stack([-_quarter_turn(weft_direction), weft_direction], axis=-1)
     return np.asarray(
-        warp_frame @ in_warp_frame @ transposed(warp_frame)
-        + weft_frame @ in_weft_frame @ transposed(weft_frame)
+        warp_frame @ in_warp_frame @ transposed(warp_frame) + weft_frame @ in_weft_frame @ transposed(weft_frame)
     )
 
 

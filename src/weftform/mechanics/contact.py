@@ -40,15 +40,14 @@ def rounded_edge(
 
 
 @scalar
-def coulomb(
-    trial_x: float, trial_y: float, trial_z: float, limit: float
-) -> tuple[float, float, float, float]:
+def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
-    Returns the three components and half the drop of the squared force [N^2]: over the tangential stiffness
-    it is the energy that the spring loses to the slip, so work = stored energy + heat holds exactly.
+    Returns the three components and the product of the excess cut off and the force kept [N^2]: the excess
+    over the tangential stiffness is the slip of the step, made against the force that is kept, so the product
+    over that stiffness is the heat.
     """
     size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
     share = min(1.0, limit / max(size, TINY))
     kept = share * size
-    return share * trial_x, share * trial_y, share * trial_z, 0.5 * (size - kept) * (size + kept)
+    return share * trial_x, share * trial_y, share * trial_z, (size - kept) * kept

@@ -41,18 +41,14 @@ def shear_angle(g11: float, g22: float, g12: float) -> float:
 
 
 @scalar
-def shear_stress(
-    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float
-) -> float:
+def shear_stress(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float) -> float:
     """``tau`` [MPa] as an odd law in ``t = tan(gamma / 2)``; the fitted polynomial is of ``tau / t``."""
     size = abs(t)
     return t * piecewise_value(coefficients, degree, pieces, width, end_slope, size)
 
 
 @scalar
-def shear_stress_slope(
-    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float
-) -> float:
+def shear_stress_slope(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float) -> float:
     """Derivative of :func:`shear_stress` with respect to ``t`` [MPa]."""
     size = abs(t)
     return piecewise_value(coefficients, degree, pieces, width, end_slope, size) + size * piecewise_slope(

@@ -91,9 +91,7 @@ class Fields:
         law: TensionLaw = self.fabric.warp if warp else self.fabric.weft
         strain = np.linalg.norm(edges, axis=-1) / pitch - 1.0
         line = law.line_law(spacing)
-        force = line.value(np.maximum(strain, 0.0)) + law.slack_ratio * line.slope(0.0) * np.minimum(
-            strain, 0.0
-        )
+        force = line.value(np.maximum(strain, 0.0)) + law.slack_ratio * line.slope(0.0) * np.minimum(strain, 0.0)
         return strain, force
 
     def _on_cells(self, values: Floats, warp: bool) -> Floats:
@@ -173,6 +171,10 @@ class Fields:
             "MembraneStress_MPa": self.membrane_stress[here],
         }
 
+    def largest_shear(self) -> float:
+        """Largest angle by which two connectors that meet have closed or opened [degrees]."""
+        return float(np.degrees(np.nanmax(np.abs(self.corner_shear))))
+
     def shear_statistics(self) -> dict[str, float]:
         """Sizes of the shear angle [degrees]: largest between connectors that meet, and over the cells by area."""
         share = self.grid.cell_share
@@ -180,9 +182,8 @@ class Fields:
         sizes = np.degrees(np.abs(self.shear_angle[here]))
         order = np.argsort(sizes)
         weight = np.cumsum(share[here][order])
-        corner = np.degrees(np.nanmax(np.abs(self.corner_shear)))
         return {
-            "max": float(corner),
+            "max": self.largest_shear(),
             "max_cell": float(sizes.max()),
             "p99": float(np.interp(0.99 * weight[-1], weight, sizes[order])),
             "mean": float((share[here] * np.degrees(np.abs(self.shear_angle[here]))).sum() / share.sum()),
@@ -195,7 +196,8 @@ def _norm(vectors: Floats) -> Floats:
 
 def _angle(a: Floats, b: Floats) -> Floats:
     """Angle by which two vectors, at right angles at first, have closed [rad]."""
-    return np.arctan2((a * b).sum(axis=-1), np.linalg.norm(np.cross(a, b), axis=-1))
+    aa, bb, ab = (np.einsum("...k,...k", p, q) for p, q in ((a, a), (b, b), (a, b)))
+    return np.arctan2(ab, np.sqrt(np.maximum(aa * bb - ab * ab, 0.0)))
 
 
 def _dyad(a: Floats, b: Floats) -> Floats:

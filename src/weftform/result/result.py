@@ -69,9 +69,7 @@ class Result:
             raise ResultError("no such folder", file=folder, expected="a folder written by `weftform run`")
         for name in ("study.toml", "fields.vtkhdf"):
             if not (folder / name).exists():
-                raise ResultError(
-                    f"{name} is missing", file=folder, expected="a folder written by `weftform run`"
-                )
+                raise ResultError(f"{name} is missing", file=folder, expected="a folder written by `weftform run`")
         return cls(folder, Study.load(folder / "study.toml"))
 
     @property
@@ -277,7 +275,7 @@ def _interpolate_cells(grid: YarnGrid, values: dict[str, Floats], u: float, v: f
     p = u / grid.warp_pitch + grid.centre[0] - 0.5
     q = v / grid.weft_pitch + grid.centre[1] - 0.5
     a, b = int(np.floor(p)), int(np.floor(q))
-    total = {name: 0.0 for name in values}
+    total = dict.fromkeys(values, 0.0)
     weights = 0.0
     for da in (0, 1):
         for db in (0, 1):

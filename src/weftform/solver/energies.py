@@ -73,9 +73,9 @@ def enter_ledger(
                 stiffness = t[6] * area
                 out[FRICTION] += state[field + 3 * stride] / (t[8] * stiffness)
                 if gap < 0.0:
-                    stick = (
-                        state[field] ** 2 + state[field + stride] ** 2 + state[field + 2 * stride] ** 2
-                    ) / (t[8] * stiffness)
+                    stick = (state[field] ** 2 + state[field + stride] ** 2 + state[field + 2 * stride] ** 2) / (
+                        t[8] * stiffness
+                    )
                     out[CONTACT] += 0.5 * stiffness * gap * gap + 0.5 * stick
             weight = state[n + at.WARP_LINE * stride]
             if weight > 0.0:
@@ -86,9 +86,7 @@ def enter_ledger(
                 out[CONNECTORS] += (
                     weight
                     * warp_pitch
-                    * connector_energy(
-                        warp_law[0], warp_law[1], wd, wp, warp_law[2], warp_law[3], warp_law[4], strain
-                    )
+                    * connector_energy(warp_law[0], warp_law[1], wd, wp, warp_law[2], warp_law[3], warp_law[4], strain)
                 )
             u = above + i
             weight = state[n + at.WEFT_LINE * stride]
@@ -100,9 +98,7 @@ def enter_ledger(
                 out[CONNECTORS] += (
                     weight
                     * weft_pitch
-                    * connector_energy(
-                        weft_law[0], weft_law[1], fd, fp, weft_law[2], weft_law[3], weft_law[4], strain
-                    )
+                    * connector_energy(weft_law[0], weft_law[1], fd, fp, weft_law[2], weft_law[3], weft_law[4], strain)
                 )
         if j == rows - 1:
             continue

@@ -20,9 +20,9 @@ from weftform.mechanics.motion import motion_value
 from weftform.solver import layout as at
 from weftform.solver.layout import Layout
 from weftform.solver.rows import (
-    LEAD,
     cell_row,
     contact_row,
+    face_row,
     gather_row,
     keep_row,
     update_row,
@@ -30,6 +30,7 @@ from weftform.solver.rows import (
     weft_row,
 )
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
+from weftform.solver.survey import ON_FACE, TOUCHING
 
 # columns of the table of rigid tools
 T_SHAPE = 0
@@ -113,7 +114,19 @@ def _sweep_band(
         if driven:
             keep_row(state, row, count, node, stride, force_field)
         for k in range(tools):
-            if touching[k, r]:
+            if touching[k, r] == ON_FACE:
+                reactions[k, r] = face_row(
+                    state,
+                    row,
+                    count,
+                    node,
+                    stride,
+                    first_tool + 4 * k,
+                    tool_table[k],
+                    poses[k, P_Z],
+                    last_step,
+                )
+            elif touching[k, r] == TOUCHING:
                 reactions[k, r] = contact_row(
                     state, row, count, node, stride, first_tool + 4 * k, tool_table[k],
                     poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
@@ -159,9 +172,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
             if driven:
                 for m in range(mode_motion.shape[0]):
                     k = mode_motion[m]
-                    value = motion_value(
-                        motion_times[k], motion_values[k], motion_knots[k], ramp, time + step
-                    )
+                    value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time + step)
                     amplitude[m] = _mode_amplitude(mode_kind[m], value)
                 share = 1.0 / (step * keep)
                 for n in range(driven_nodes.shape[0]):
@@ -196,9 +207,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 poses[k, P_REACTION] = total
                 drive = total
                 if mass > 0.0:
-                    drive = motion_value(
-                        motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time
-                    )
+                    drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time)
                     rate = tool_table[k, T_DAMPING]
                     old = poses[k, P_VELOCITY]
                     new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
@@ -224,9 +233,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                     place = driven_nodes[n]
                     for c in range(3):
                         now = state[place + (at.VELOCITY + c) * stride] * step
-                        work -= (
-                            state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
-                        )
+                        work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
                         driven_state[n, 3 + c] = now
                 clock[C_DRIVE_WORK] += work
             clock[C_TIME] = time + step
@@ -237,6 +244,4 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         restore_subnormals(environment)
         return done
 
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(
-        advance
-    )
+    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(advance)

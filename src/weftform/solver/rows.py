@@ -174,9 +174,7 @@ def cell_row(
 
 
 @row_loop
-def weft_row(
-    state, row, count, edge, node, stride, row_length, half_cells, inverse_length, degree, pieces, law
-):
+def weft_row(state, row, count, edge, node, stride, row_length, half_cells, inverse_length, degree, pieces, law):
     """Weft connectors between a row and the next, plus the share of the cells on both sides."""
     s = np.uint64(stride)
     step = np.uint64(row_length)
@@ -225,6 +223,62 @@ def keep_row(state, row, count, node, stride, field):
 
 
 @row_loop
+def sum_axial(node, count, axial):
+    """Sum of a scratch row in four lanes, which a vector unit adds at once and always in the same order."""
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    i = np.uint64(0)
+    while i < count:
+        a += node[axial + i]
+        b += node[axial + U1 + i]
+        c += node[axial + U1 + U1 + i]
+        d += node[axial + U1 + U1 + U1 + i]
+        i += U4
+    return (a + b) + (c + d)
+
+
+@row_loop
+def face_row(state, row, count, node, stride, field, tool, tool_z, step):
+    """:func:`contact_row` for a row that lies wholly against the flat face of a tool: the normal is the axis."""
+    s = np.uint64(stride)
+    z = row + s + s
+    vx = z + s
+    vy = vx + s
+    area = row + s * np.uint64(at.AREA)
+    tx = row + s * np.uint64(field)
+    ty = tx + s
+    tz = ty + s
+    slipped = tz + s
+    block = s + s + s + LEAD + LEAD
+    force = LEAD + block
+    axial = LEAD + block + block
+    side, z0, radius = tool[2], tool[3], tool[4]
+    half_thickness, stiffness, friction, ratio = tool[5], tool[6], tool[7], tool[8]
+    for i in range(count):
+        distance = side * (state[z + i] - tool_z - z0) - radius
+        k = stiffness * state[area + i]
+        press = k * max(half_thickness - distance, 0.0)
+        kt = ratio * k
+        fx, fy, _, heat = coulomb(
+            state[tx + i] - kt * (state[vx + i] * step),
+            state[ty + i] - kt * (state[vy + i] * step),
+            0.0,
+            friction * press,
+        )
+        state[tx + i] = fx
+        state[ty + i] = fy
+        state[tz + i] = 0.0
+        state[slipped + i] += heat
+        node[force + i] += fx
+        node[force + s + i] += fy
+        node[force + s + s + i] += press * side
+        node[axial + i] = press * side
+    return sum_axial(node, count, axial)
+
+
+@row_loop
 def contact_row(state, row, count, node, stride, field, tool, tool_z, tool_step, step):
     """Penalty contact and Coulomb friction of a row with one tool; returns the axial force on the fabric [N].
 
@@ -249,9 +303,7 @@ def contact_row(state, row, count, node, stride, field, tool, tool_z, tool_step,
         px = state[x + i]
         py = state[y + i]
         away = math.sqrt(px * px + py * py)
-        distance, normal_s, normal_z = rounded_edge(
-            away, state[z + i] - tool_z, side_s, s0, side_z, z0, radius
-        )
+        distance, normal_s, normal_z = rounded_edge(away, state[z + i] - tool_z, side_s, s0, side_z, z0, radius)
         k = stiffness * state[area + i]
         press = k * max(half_thickness - distance, 0.0)
         radial = normal_s / max(away, SMALL)
@@ -273,18 +325,7 @@ def contact_row(state, row, count, node, stride, field, tool, tool_z, tool_step,
         node[force + s + i] += press * ny + fy
         node[force + s + s + i] += total
         node[axial + i] = total
-    a = 0.0
-    b = 0.0
-    c = 0.0
-    d = 0.0
-    i = np.uint64(0)
-    while i < count:
-        a += node[axial + i]
-        b += node[axial + U1 + i]
-        c += node[axial + U1 + U1 + i]
-        d += node[axial + U1 + U1 + U1 + i]
-        i += U4
-    return (a + b) + (c + d)
+    return sum_axial(node, count, axial)
 
 
 @row_loop

@@ -14,9 +14,8 @@ from weftform.errors import UnstableRun
 from weftform.fabric import Fabric
 from weftform.fabric.piecewise import PiecewiseLaw, pack_law, pack_shear
 from weftform.mechanics import stable_step as stability
-from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
-from weftform.solver import layout as at
 from weftform.solver import energies, loop, survey
+from weftform.solver import layout as at
 from weftform.solver.layout import Layout, stride_for
 from weftform.tooling import RigidTool
 
@@ -260,9 +259,7 @@ class Simulation:
         weft = np.zeros(grid.shape)
         weft[1:] += grid.weft_lines
         weft[:-1] += grid.weft_lines
-        return np.where(
-            grid.active, np.maximum(grid.node_area, 0.5 * grid.cell_area * np.maximum(warp, weft)), 0.0
-        )
+        return np.where(grid.active, np.maximum(grid.node_area, 0.5 * grid.cell_area * np.maximum(warp, weft)), 0.0)
 
     def _place_tools(self) -> None:
         tools = self.problem.tools
@@ -294,7 +291,7 @@ class Simulation:
             self._motion_times[k, :n] = motion.times
             self._motion_values[k, :n] = motion.values
             self._motion_knots[k] = n
-        self._touching = np.ones((len(tools), self._local_rows), np.bool_)
+        self._touching = np.full((len(tools), self._local_rows), survey.TOUCHING, np.int8)
         self._reactions = np.zeros((len(tools), self._local_rows))
 
     def _drive_crossings(self) -> None:
@@ -322,18 +319,15 @@ class Simulation:
         s, grid, membrane = self.last, self.problem.grid, self._membrane
         warp, weft, shear = self._packed
         # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the truth.
-        k_warp = _largest_slope(warp, s[survey.WARP_STRAIN]) / grid.warp_pitch
-        k_weft = _largest_slope(weft, s[survey.WEFT_STRAIN]) / grid.weft_pitch
+        _, warp_slope = _largest(warp, s[survey.WARP_STRAIN])
+        _, weft_slope = _largest(weft, s[survey.WEFT_STRAIN])
+        k_warp, k_weft = warp_slope / grid.warp_pitch, weft_slope / grid.weft_pitch
         t = s[survey.HALF_TANGENT]
         sine = 2.0 * t / (1.0 + t * t)
-        stress_slope = _largest_value(shear, t) + t * _largest_slope(shear, t)
-        modulus = 0.5 * stress_slope * (1.0 + t * t) + t * _largest_value(shear, t)
+        ratio, ratio_slope = _largest(shear, t)
+        modulus = 0.5 * (ratio + t * ratio_slope) * (1.0 + t * t) + t * ratio
         aspect = grid.cell_area / min(grid.warp_pitch, grid.weft_pitch) ** 2
-        cell = (
-            self.problem.fabric.thickness
-            * aspect
-            * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
-        )
+        cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
         crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
         contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
         self.clock[loop.C_STEP] = self.problem.settings.safety * stability.stable_step(
@@ -435,6 +429,42 @@ class Simulation:
             hint="lower solver.safety, lengthen loading.duration_s, or soften the contact (contact.*.stiffness_N_per_mm3)",
         )
 
+    def compile(self) -> None:
+        """Compile the time loop, or load it from the cache, by calling it for no step."""
+        clock = self.clock.copy()
+        self._advance(0, 0.0)
+        self.clock[:] = clock
+
+    def checkpoint(self) -> dict[str, Floats]:
+        """Everything that :meth:`restore` needs to go on."""
+        return {
+            "fields": self._state[self._row_index],
+            "poses": self._poses.copy(),
+            "clock": self.clock.copy(),
+            "driven": self._driven_state.copy(),
+            "tools": self._tool_table.copy(),
+        }
+
+    def restore(self, saved: dict[str, Floats]) -> None:
+        """Go on from a checkpoint, with any number of threads.
+
+        Raises
+        ------
+        ValueError
+            The checkpoint is of another problem.
+        """
+        fields = saved["fields"]
+        if fields.shape != self._state[self._row_index].shape:
+            raise ValueError(f"its state has shape {fields.shape}, not {self._state[self._row_index].shape}")
+        self._state[self._row_index] = fields
+        if self._halo_to.size:
+            self._state[self._halo_to] = fields[self._halo_row]
+        self._poses[:] = saved["poses"]
+        self.clock[:] = saved["clock"]
+        self._driven_state[:] = saved["driven"]
+        self._tool_table[:] = saved["tools"]
+        self.last = self._survey()
+
     # -- looking ---------------------------------------------------------------------------------------------------
 
     @property
@@ -481,9 +511,7 @@ class Simulation:
         """Force that moves each driven crossing, as of the last step [N], shape [nodes, 3]."""
         flat = self._state.reshape(-1)
         first = self.layout.force * self.layout.stride
-        return -np.stack(
-            [flat[self._driven_nodes + first + c * self.layout.stride] for c in range(3)], axis=-1
-        )
+        return -np.stack([flat[self._driven_nodes + first + c * self.layout.stride] for c in range(3)], axis=-1)
 
     def tool_position(self, index: int) -> float:
         """Way of a tool along z since the start [mm]."""
@@ -496,22 +524,9 @@ class Simulation:
     @property
     def contact_forces(self) -> Floats:
         """Force of all tools on each crossing [N], shape [rows, columns, 3]."""
-        from weftform.mechanics.contact import rounded_edge
-
-        total = np.zeros((self.rows, self.columns, 3))
-        rows = self._state[self._row_index]
-        x, y, z = (rows[:, at.POSITION + c, : self.columns] for c in range(3))
-        area = rows[:, at.AREA, : self.columns]
-        away = np.hypot(x, y)
-        for k, table in enumerate(self._tool_table):
-            distance, normal_s, normal_z = _edge_field(rounded_edge, away, z - self._poses[k, 0], table)
-            press = table[6] * area * np.maximum(table[5] - distance, 0.0)
-            radial = press * normal_s / np.maximum(away, 1e-12)
-            friction = self.layout.tool + at.TOOL_FIELDS * k
-            total[..., 0] += radial * x + rows[:, friction, : self.columns]
-            total[..., 1] += radial * y + rows[:, friction + 1, : self.columns]
-            total[..., 2] += press * normal_z + rows[:, friction + 2, : self.columns]
-        return total
+        rows = np.ascontiguousarray(self._state[self._row_index][:, :, : self.columns])
+        forces: Floats = survey.contact_forces(rows, self.layout.tool, self._tool_table, self._poses)
+        return forces
 
     @property
     def penetration(self) -> float:
@@ -535,33 +550,17 @@ class Simulation:
         )
 
 
-def _edge_field(
-    rounded_edge: Callable[..., tuple[float, float, float]], away: Floats, z: Floats, table: Floats
-) -> tuple[Floats, Floats, Floats]:
-    return np.vectorize(lambda s, h: rounded_edge(s, h, *table[:5]), otypes=[float, float, float])(away, z)
-
-
 def _law_arguments(law: PiecewiseLaw, slack_ratio: float) -> tuple[Floats, Floats, float, float, float]:
     initial = float(law.coefficients[law.degree - 1]) if law.degree else 0.0
     return law.coefficients, law.integrals, law.width, law.end_slope, slack_ratio * initial
 
 
-def _largest_slope(law: PiecewiseLaw, x: float) -> float:
-    """Largest derivative of a packed law on 0..x, sampled."""
-    samples = np.linspace(0.0, max(x, 0.0), 17)
-    return max(
-        piecewise_slope(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s)
-        for s in samples
+def _largest(law: PiecewiseLaw, x: float) -> tuple[float, float]:
+    """Largest value and largest slope of a packed law on 0..x, sampled."""
+    found: tuple[float, float] = survey.largest_on(
+        law.coefficients, law.degree, law.pieces, law.width, law.end_slope, max(x, 0.0)
     )
-
-
-def _largest_value(law: PiecewiseLaw, x: float) -> float:
-    """Largest value of a packed law on 0..x, sampled."""
-    samples = np.linspace(0.0, max(x, 0.0), 17)
-    return max(
-        piecewise_value(law.coefficients, law.degree, law.pieces, law.width, law.end_slope, s)
-        for s in samples
-    )
+    return found
 
 
 def _log_series() -> Floats:

@@ -147,9 +147,7 @@ class StudyModel(Declared):
                 )
         for name in self.tools:
             if name not in self.contact:
-                raise ValueError(
-                    f"tool {name} has no [contact.{name}]; every pair is named, with its friction"
-                )
+                raise ValueError(f"tool {name} has no [contact.{name}]; every pair is named, with its friction")
         if not any(tool.motion == "stroke" for tool in self.tools.values()):
             raise ValueError('no tool moves: give one of them motion = "stroke"')
         return self

@@ -27,9 +27,7 @@ PLANES = {"full": (), "half-x": ("x",), "half-y": ("y",), "quarter": ("x", "y")}
 def shipped_studies() -> dict[str, Path]:
     """Names and files of the studies in the package."""
     folder = resources.files("weftform") / "data" / "studies"
-    return {
-        p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)
-    }
+    return {p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)}
 
 
 @dataclass(frozen=True)
