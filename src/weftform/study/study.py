@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +17,11 @@ from weftform.declared import read_toml, validated
 from weftform.errors import CardError, StudyError
 from weftform.fabric import Fabric
 from weftform.fabric.fabric import merge_tables
+from weftform.study.shipped import shipped_studies
 from weftform.study.schema import BlankTable, StudyModel, ToolTable
 from weftform.tooling import RigidTool, flat_punch, hemisphere, opening
 
 PLANES = {"full": (), "half-x": ("x",), "half-y": ("y",), "quarter": ("x", "y")}
-
-
-def shipped_studies() -> dict[str, Path]:
-    """Names and files of the studies in the package."""
-    folder = resources.files("weftform") / "data" / "studies"
-    return {p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,48 @@
+"""The command line: one file per verb, thin. Heavy imports happen inside the verbs, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from weftform.cli.bodies import VERBS
+from weftform.errors import WeftformError
+
+app = typer.Typer(
+    name="weftform",
+    help="Forming simulation of dry woven reinforcements, from laboratory tests to the formed part.\n\n"
+    "Start with: weftform run hemisphere-0-90 --out results/hemisphere",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+)
+
+for name, body in VERBS.items():
+    app.command(name)(body)
+
+
+def main() -> None:
+    """Entry point: typed errors become one message and their exit code, without a traceback unless ``--debug``."""
+    arguments = sys.argv[1:]
+    debug = "--debug" in arguments
+    if debug:
+        arguments.remove("--debug")
+    try:
+        app(args=arguments)
+    except WeftformError as problem:
+        if debug:
+            raise
+        typer.secho("error: ", fg="red", bold=True, err=True, nl=False)
+        typer.echo(str(problem), err=True)
+        sys.exit(problem.exit_code)
+    except KeyboardInterrupt:
+        typer.secho("interrupted", fg="yellow", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(0)
+
+
+__all__ = ["app", "main"]

@@ -1,0 +1,24 @@
+"""The verbs in the order of ``weftform --help``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from weftform.cli.cards import cards
+from weftform.cli.check import check
+from weftform.cli.doctor import doctor
+from weftform.cli.new import new
+from weftform.cli.probe import probe
+from weftform.cli.run import run
+from weftform.cli.studies import studies
+
+VERBS: dict[str, Callable[..., Any]] = {
+    "new": new,
+    "check": check,
+    "run": run,
+    "probe": probe,
+    "studies": studies,
+    "cards": cards,
+    "doctor": doctor,
+}
