@@ -15,7 +15,13 @@ from typing import Any
 
 REQUIRED = ("numpy", "scipy", "numba", "h5py", "pydantic", "typer", "rich", "matplotlib", "shapely", "tomlkit")
 
-TINY = ("blank.cell_length_mm=7.5", "loading.stroke_mm=8", "loading.duration_s=0.03", "output.frames=2", "output.rows=5")
+TINY = (
+    "blank.cell_length_mm=7.5",
+    "loading.stroke_mm=8",
+    "loading.duration_s=0.03",
+    "output.frames=2",
+    "output.rows=5",
+)
 """Changes that make the shipped hemisphere a run of a fraction of a second."""
 
 TINY_SHEAR_DEG = 1.2221
@@ -110,7 +116,9 @@ def _writing() -> Finding:
         with tempfile.NamedTemporaryFile(dir=Path.cwd()):
             pass
     except OSError as problem:
-        return Finding("this folder", f"cannot be written ({problem.strerror})", False, "give another folder with --out")
+        return Finding(
+            "this folder", f"cannot be written ({problem.strerror})", False, "give another folder with --out"
+        )
     return Finding("this folder", "can be written", True)
 
 
@@ -150,7 +158,9 @@ def _rendering() -> Finding:
     try:
         version = metadata.version("pyvista")
     except metadata.PackageNotFoundError:
-        return Finding("3D view", "pyvista is not installed; `weftform view` writes pictures (pip install weftform[view])", True)
+        return Finding(
+            "3D view", "pyvista is not installed; `weftform view` writes pictures (pip install weftform[view])", True
+        )
     script = (
         "import pyvista as p; q = p.Plotter(off_screen=True, window_size=(64, 64)); q.add_mesh(p.Sphere()); "
         "i = q.screenshot(return_img=True); assert i.std() > 0; print('rendered')"

@@ -12,15 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from weftform.blank.outline import diagonal_angle
-from weftform.errors import StudyError, UnstableRun
+from weftform.cases import Case, case_of
+from weftform.errors import ResultError, StudyError, UnstableRun
 from weftform.result import Result
 from weftform.result.fields import Fields
-from weftform.result.outline import draw_in, formed_outline
 from weftform.result.writer import ResultWriter, claim_folder, write_whole
 from weftform.solver import Ledger, Simulation
 from weftform.study import Study
-from weftform.study.problem import forming_problem
 
 MOST_IMBALANCE = 0.01
 """Largest share of the work that the ledger may miss."""
@@ -35,12 +33,10 @@ CELLS_PER_THREAD = 1500
 CHECKPOINT_SECONDS = 20.0
 """Wall time between checkpoints of a long run."""
 
-HISTORY = [
+COLUMNS = (
     "time_s",
     "displacement_mm",
     "force_N",
-    "holder_displacement_mm",
-    "holder_reaction_N",
     "shear_angle_max_deg",
     "kinetic_energy_mJ",
     "internal_energy_mJ",
@@ -52,10 +48,10 @@ HISTORY = [
     "damping_energy_mJ",
     "external_work_mJ",
     "imbalance_mJ",
-    "penetration_mm",
     "step_s",
     "steps",
-]
+)
+"""Columns of ``history.csv`` of every study; each case adds its own. Energies are of the whole blank."""
 
 
 @dataclass(frozen=True)
@@ -141,34 +137,29 @@ def run(
     out = Path(out)
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
-    FormingRun(study, out, threads, watch, resume).go()
+    Run(case_of(study), out, threads, watch, resume).go()
     return Result.open(out)
 
 
-class FormingRun:
-    """One run of a forming study."""
+class Run:
+    """One run of a case."""
 
-    def __init__(self, study: Study, out: Path, threads: int, watch: Watch | None, resume: bool) -> None:
-        self.study = study
+    def __init__(self, case: Case, out: Path, threads: int, watch: Watch | None, resume: bool) -> None:
+        self.case = case
+        self.study = case.study
         self.out = out
         self.watch = watch
-        self.grid = study.grid
+        self.grid = case.grid
+        self.columns = [*COLUMNS, *case.columns]
         if watch is not None:
             watch(Progress(0.0, 0.0, 0, 0.0, math.nan, compiling=True))
-        self.simulation = Simulation(forming_problem(study), threads)
-        self.copies = self.grid.copies
-        loading = study.model.loading
-        self.end = loading.closing_s + loading.duration_s
-        self.punch = next(k for k, tool in enumerate(study.tools) if tool.motion == "stroke")
-        self.holder = next((k for k, tool in enumerate(study.tools) if tool.motion == "force"), None)
+        self.simulation = Simulation(case.problem(), threads)
         self.rows: list[dict[str, float]] = []
         self.peak_penetration = 0.0
-        self.peak_speed_step = 0
         self.wall = 0.0
-        self._forces: list[tuple[float, float]] = []
-        self._frame = 0
-        self._row = 0
+        self._forces: list[float] = []
         self._resume = resume
+        self._resumed_to = -1.0
         self._checkpointed = time.monotonic()
 
     # -- the march --------------------------------------------------------------------------------------------------
@@ -177,14 +168,14 @@ class FormingRun:
         """March through the outputs, keep what is computed whatever happens."""
         study, simulation = self.study, self.simulation
         output = study.model.output
-        loading = study.model.loading
+        case = self.case
         if self._resume:
             self._restore()
         else:
             write_whole(self.out / "study.toml", study.to_toml(_versions()))
-        writer = ResultWriter(self.out, HISTORY, self._fields(), resume=self._resume)
-        frames = loading.closing_s + np.linspace(0.0, loading.duration_s, output.frames)
-        rows = np.linspace(0.0, self.end, output.rows)
+        writer = ResultWriter(self.out, self.columns, self._fields(), resume=self._resume)
+        frames = np.linspace(case.begin, case.end, output.frames)
+        rows = np.linspace(0.0, case.end, output.rows)
         stops = np.unique(np.concatenate([frames, rows]))
         frames_at, rows_at = set(frames.tolist()), set(rows.tolist())
         self._warm_up()
@@ -197,13 +188,13 @@ class FormingRun:
                 if stop in rows_at:
                     writer.row(self._enter_row())
                 if stop in frames_at:
-                    writer.frame(simulation.time, self.stroke, self._fields(), simulation.contact_forces)
+                    self._frame(writer)
                 if time.monotonic() - self._checkpointed > CHECKPOINT_SECONDS:
                     self._checkpoint(float(stop))
             self._finish(writer, "done")
             (self.out / "checkpoint.npz").unlink(missing_ok=True)
         except KeyboardInterrupt:
-            self._finish(writer, f"interrupted at a stroke of {self.stroke:.2f} mm")
+            self._finish(writer, f"interrupted at {self.displacement:.2f} mm")
             raise
         except UnstableRun as problem:
             self._finish(writer, problem.message)
@@ -224,17 +215,17 @@ class FormingRun:
         self.simulation.compile()
 
     def _look(self, simulation: Simulation) -> None:
-        self._forces.append((simulation.time, abs(simulation.tool_reaction(self.punch)) * self.copies))
+        self._forces.append(self.case.force(simulation))
         self.peak_penetration = max(self.peak_penetration, simulation.penetration)
         now = time.perf_counter()
         if self.watch is not None and now - self._last_report > 0.1:
             self._last_report = now
             spent = now - self._started
-            share = min(simulation.time / self.end, 1.0)
+            share = min(simulation.time / self.case.end, 1.0)
             self.watch(
                 Progress(
                     share,
-                    self.stroke,
+                    self.displacement,
                     simulation.steps,
                     self._rate(spent),
                     # the step shrinks as the yarns straighten, so the last part costs more than its share
@@ -246,32 +237,29 @@ class FormingRun:
         return seconds / max(self.simulation.steps * self.grid.cell_count, 1) * 1e9
 
     @property
-    def stroke(self) -> float:
-        """Way of the punch [mm]."""
-        return abs(self.simulation.tool_position(self.punch))
+    def displacement(self) -> float:
+        """Stroke or displacement so far [mm]."""
+        return self.case.displacement(self.simulation)
 
     def _fields(self) -> Fields:
         return Fields(self.grid, self.study.fabric, self.simulation.positions)
+
+    def _frame(self, writer: ResultWriter) -> None:
+        writer.frame(self.simulation.time, self.displacement, self._fields(), self.simulation.contact_forces)
 
     def _enter_row(self) -> dict[str, float]:
         """A row of the history; forces are means over the time since the last row."""
         simulation = self.simulation
         ledger: Ledger = simulation.ledger()
-        n = self.copies
-        force = (
-            float(np.mean([f for _, f in self._forces]))
-            if self._forces
-            else abs(simulation.tool_reaction(self.punch)) * n
-        )
+        fields = self._fields()
+        n = self.grid.copies
+        force = float(np.mean(self._forces)) if self._forces else self.case.force(simulation)
         self._forces.clear()
-        holder = self.holder
         row = {
             "time_s": simulation.time,
-            "displacement_mm": self.stroke,
+            "displacement_mm": self.displacement,
             "force_N": force,
-            "holder_displacement_mm": simulation.tool_position(holder) if holder is not None else 0.0,
-            "holder_reaction_N": abs(simulation.tool_reaction(holder)) * n if holder is not None else 0.0,
-            "shear_angle_max_deg": self._fields().largest_shear(),
+            "shear_angle_max_deg": fields.largest_shear(),
             "kinetic_energy_mJ": n * ledger.kinetic,
             "internal_energy_mJ": n * ledger.internal,
             "connector_energy_mJ": n * ledger.connectors,
@@ -282,9 +270,9 @@ class FormingRun:
             "damping_energy_mJ": n * ledger.damping,
             "external_work_mJ": n * ledger.work,
             "imbalance_mJ": n * ledger.imbalance,
-            "penetration_mm": simulation.penetration,
             "step_s": simulation.step,
             "steps": float(simulation.steps),
+            **self.case.row(simulation, fields, force),
         }
         self.rows.append(row)
         return row
@@ -292,43 +280,40 @@ class FormingRun:
     # -- the end ----------------------------------------------------------------------------------------------------
 
     def _finish(self, writer: ResultWriter, status: str) -> None:
-        if status != "done" and np.isfinite(self.simulation.positions).all():
+        sound = bool(np.isfinite(self.simulation.positions).all())
+        if status != "done" and sound:
             writer.row(self._enter_row())
-            writer.frame(self.simulation.time, self.stroke, self._fields(), self.simulation.contact_forces)
+            self._frame(writer)
             self._checkpoint(self.simulation.time)
-        if np.isfinite(self.simulation.positions).all():
+        if sound:
             writer.outline(self._fields())
-        writer.summary(self.summary(status))
+        writer.summary(self.summary(status, sound))
 
-    def summary(self, status: str) -> dict[str, Any]:
-        """What ``summary.json`` says."""
+    def summary(self, status: str, sound: bool) -> dict[str, Any]:
+        """What ``summary.json`` says; after a blow-up without the values that have no meaning."""
         study, grid, simulation = self.study, self.grid, self.simulation
         fields = self._fields()
         energy = energy_summary(self.rows)
-        finite = bool(np.isfinite(simulation.positions).all())
         warnings = self._warnings(energy)
         values: dict[str, Any] = {
             "study": study.name,
             "ok": status == "done" and not warnings,
             "status": status,
             "warnings": warnings,
+            "notes": self.case.warnings(),
             "cells": grid.cell_count,
             "steps": simulation.steps,
             "wall_s": self.wall,
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
             "energy": energy,
-            "shear_angle_deg": fields.shear_statistics() if finite else None,
-            "punch_force_N": self.rows[-1]["force_N"] if self.rows else 0.0,
-            "stroke_mm": self.stroke,
-            "holder_displacement_mm": self.rows[-1]["holder_displacement_mm"] if self.rows else 0.0,
+            "shear_angle_deg": fields.shear_statistics() if sound else None,
             "penetration_mm": self.peak_penetration,
             "penetration_share_of_thickness": self.peak_penetration / study.fabric.thickness,
             "blank": blank_summary(study),
         }
-        if finite:
-            flat, formed, _ = formed_outline(grid, fields.positions)
-            values["draw_in_mm"] = draw_in(flat, formed, diagonal_angle(study.outline))
+        if sound and self.rows:
+            values.update(self.case.summary(self.rows, fields))
         return values
 
     def _warnings(self, energy: dict[str, float]) -> list[str]:
@@ -355,7 +340,7 @@ class FormingRun:
     def _checkpoint(self, stop: float) -> None:
         state = self.simulation.checkpoint()
         extra = {
-            "history": np.array([[row[c] for c in HISTORY] for row in self.rows]),
+            "history": np.array([[row[c] for c in self.columns] for row in self.rows]),
             "progress": np.array([stop, self.peak_penetration, self.wall]),
         }
         temporary = self.out / "checkpoint.part.npz"
@@ -364,13 +349,11 @@ class FormingRun:
         self._checkpointed = time.monotonic()
 
     def _restore(self) -> None:
-        from weftform.errors import ResultError
-
         path = self.out / "checkpoint.npz"
         try:
             with np.load(path) as data:
                 self.simulation.restore({k: data[k] for k in data.files})
-                self.rows = [dict(zip(HISTORY, (float(v) for v in row), strict=True)) for row in data["history"]]
+                self.rows = [dict(zip(self.columns, (float(v) for v in row), strict=True)) for row in data["history"]]
                 self._resumed_to, self.peak_penetration, self.wall = (float(v) for v in data["progress"])
         except (OSError, ValueError, KeyError) as problem:
             raise ResultError(
@@ -378,8 +361,6 @@ class FormingRun:
                 file=path,
                 hint="resume with the same study and changes, or run anew without --resume",
             ) from None
-
-    _resumed_to = -1.0
 
 
 def energy_summary(rows: list[dict[str, float]]) -> dict[str, float]:
@@ -405,7 +386,7 @@ def blank_summary(study: Study) -> dict[str, float | int | str]:
         "warp_cell_length_mm": grid.warp_pitch,
         "weft_cell_length_mm": grid.weft_pitch,
         "warp_angle_deg": math.degrees(grid.warp_angle),
-        "symmetry": study.model.blank.symmetry,
+        "symmetry": {1: "full", 2: "half", 4: "quarter"}[grid.copies],
         "half_cells": int((grid.cells > 1).sum()),
         "area_mm2": grid.area * grid.copies,
         "area_error": grid.area / grid.requested_area - 1.0,
@@ -429,4 +410,4 @@ def _versions() -> str:
     )
 
 
-__all__ = ["FormingRun", "Progress", "run", "threads_for"]
+__all__ = ["Progress", "Run", "run", "threads_for"]

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from weftform.cases import case_of
 from weftform.execution import blank_summary, threads_for
 from weftform.fabric.fabric import TensionLaw
 from weftform.mechanics.stable_step import stable_step
 from weftform.study import Study
+from weftform.study.schema import FormingModel
 
 NS_PER_CELL_STEP = 45.0
 """Of one thread with three tools on a laptop of 2023; `weftform doctor` measures this machine."""
@@ -80,7 +82,7 @@ def forecast(study: Study) -> Forecast:
     tight = step(
         _strain_at(fabric.warp, grid.weft_pitch, WORKING_FORCE), _strain_at(fabric.weft, grid.warp_pitch, WORKING_FORCE)
     )
-    time = model.loading.closing_s + model.loading.duration_s
+    time = case_of(study).end
     steps = int(0.5 * time * (1.0 / first + 1.0 / tight))
     threads = threads_for(grid.cell_count, None)
     blank = blank_summary(study)
@@ -116,21 +118,18 @@ def _strain_at(law: TensionLaw, spacing: float, force: float) -> float:
 
 
 def _warnings(study: Study, steps: int, area_error: float) -> list[str]:
-    found = []
+    found = case_of(study).warnings()
     model, grid = study.model, study.grid
-    target = model.blank.cell_length_mm
-    change = max(abs(grid.warp_pitch / target - 1.0), abs(grid.weft_pitch / target - 1.0))
-    if change > 0.05:
-        found.append(
-            f"the cell length was changed by {100 * change:.1f} % to meet the outline; blank.fit_cells = false keeps it"
-        )
+    if isinstance(model, FormingModel):
+        target = model.blank.cell_length_mm
+        change = max(abs(grid.warp_pitch / target - 1.0), abs(grid.weft_pitch / target - 1.0))
+        if change > 0.05:
+            found.append(
+                f"the cell length was changed by {100 * change:.1f} % to meet the outline; "
+                "blank.fit_cells = false keeps it"
+            )
     if abs(area_error) > 0.01:
         found.append(f"the cells cover {100 * area_error:+.1f} % of the outline's area; smaller cells come closer")
-    smallest = min((t.edge_radius_mm for t in model.tools.values() if t.edge_radius_mm), default=np.inf)
-    if any(t.edge_radius_mm and t.edge_radius_mm > 1.0 for t in model.tools.values()):
-        smallest = min(t.edge_radius_mm for t in model.tools.values() if t.edge_radius_mm and t.edge_radius_mm > 1.0)
-        if max(grid.warp_pitch, grid.weft_pitch) > smallest:
-            found.append(f"cells longer than the smallest fillet ({smallest:g} mm) cut its corner")
     if steps > model.solver.most_steps:
         found.append("more steps than solver.most_steps allows: the run would stop before its end")
     return found

@@ -154,7 +154,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         state, bounds, halo_to, halo_from, columns, edge, node, membrane, series,
         warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
         tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
-        driven_nodes, driven_state, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha, density,
+        driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha, density,
     ):  # fmt: skip
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
         environment = flush_subnormals()
@@ -177,6 +177,8 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 share = 1.0 / (step * keep)
                 for n in range(driven_nodes.shape[0]):
                     for c in range(3):
+                        if not driven_held[n, c]:
+                            continue
                         target = driven_state[n, c]
                         for m in range(mode_motion.shape[0]):
                             target += amplitude[m] * driven_modes[m, n, c]
@@ -232,6 +234,8 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 for n in range(driven_nodes.shape[0]):
                     place = driven_nodes[n]
                     for c in range(3):
+                        if not driven_held[n, c]:
+                            continue
                         now = state[place + (at.VELOCITY + c) * stride] * step
                         work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
                         driven_state[n, 3 + c] = now

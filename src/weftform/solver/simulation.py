@@ -14,6 +14,7 @@ from weftform.errors import UnstableRun
 from weftform.fabric import Fabric
 from weftform.fabric.piecewise import PiecewiseLaw, pack_law, pack_shear
 from weftform.mechanics import stable_step as stability
+from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, loop, survey
 from weftform.solver import layout as at
 from weftform.solver.layout import Layout, stride_for
@@ -51,6 +52,8 @@ class Driven:
     ----------
     nodes
         Flat indices (row * columns + column), shape [nodes].
+    held
+        Which of the components x, y, z follow, shape [nodes, 3]; the others are free.
     modes
         Displacement [mm] per unit of each amplitude, shape [modes, nodes, 3].
     motions
@@ -60,6 +63,7 @@ class Driven:
     """
 
     nodes: NDArray[np.int64]
+    held: NDArray[np.bool_]
     modes: Floats
     motions: tuple[int, ...]
     kinds: tuple[int, ...]
@@ -300,6 +304,7 @@ class Simulation:
         if driven is None:
             self._driven_nodes = np.zeros(0, np.int64)
             self._driven_state = np.zeros((0, 6))
+            self._driven_held = np.zeros((0, 3), np.bool_)
             self._driven_modes = np.zeros((0, 0, 3))
             self._mode_motion = np.zeros(0, np.int64)
             self._mode_kind = np.zeros(0, np.int64)
@@ -310,7 +315,9 @@ class Simulation:
         self._driven_state = np.zeros((len(driven.nodes), 6))
         for c in range(3):
             self._driven_state[:, c] = self._state[local, at.POSITION + c, column]
-            self._state[local, at.INVERSE_MASS + c, column] = 0.0
+            held = driven.held[:, c]
+            self._state[local[held], at.INVERSE_MASS + c, column[held]] = 0.0
+        self._driven_held = np.ascontiguousarray(driven.held)
         self._driven_modes = np.ascontiguousarray(driven.modes)
         self._mode_motion = np.asarray(driven.motions, np.int64)
         self._mode_kind = np.asarray(driven.kinds, np.int64)
@@ -393,7 +400,7 @@ class Simulation:
                 self._membrane[0], self._membrane[1],
                 self._tool_table, self._poses, self._touching, self._reactions,
                 self._motion_times, self._motion_values, self._motion_knots, settings.ramp,
-                self._driven_nodes, self._driven_state, self._driven_modes, self._mode_motion, self._mode_kind,
+                self._driven_nodes, self._driven_state, self._driven_held, self._driven_modes, self._mode_motion, self._mode_kind,
                 self.clock, steps, stop, settings.damping, self.density,
             )
         )  # fmt: skip
@@ -508,10 +515,23 @@ class Simulation:
 
     @property
     def driven_forces(self) -> Floats:
-        """Force that moves each driven crossing, as of the last step [N], shape [nodes, 3]."""
+        """Force that moves each driven crossing, as of the last step [N], shape [nodes, 3]; zero where it is free."""
         flat = self._state.reshape(-1)
         first = self.layout.force * self.layout.stride
-        return -np.stack([flat[self._driven_nodes + first + c * self.layout.stride] for c in range(3)], axis=-1)
+        inner = np.stack([flat[self._driven_nodes + first + c * self.layout.stride] for c in range(3)], axis=-1)
+        return np.where(self._driven_held, -inner, 0.0)
+
+    def motion(self, index: int) -> float:
+        """Value of a motion of the problem now."""
+        return float(
+            motion_value(
+                self._motion_times[index],
+                self._motion_values[index],
+                self._motion_knots[index],
+                self.problem.settings.ramp,
+                self.time,
+            )
+        )
 
     def tool_position(self, index: int) -> float:
         """Way of a tool along z since the start [mm]."""

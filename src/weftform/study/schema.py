@@ -8,6 +8,9 @@ from pydantic import Field, model_validator
 
 from weftform.fabric.card import Declared, Finite, NotNegative, Positive
 
+Ramp = Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)]
+"""Share of a motion spent gathering speed, and again losing it."""
+
 Coefficient = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False)]
 
 
@@ -97,13 +100,13 @@ class ContactTable(Declared):
     tangential_ratio: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 0.5
 
 
-class LoadingTable(Declared):
+class FormingLoading(Declared):
     """Stroke and its timing. Times are of the simulation: with quasi-static forming they only set how many steps are made."""
 
     stroke_mm: Positive
     closing_s: NotNegative = 0.01
     duration_s: Positive
-    ramp: Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)] = 0.2
+    ramp: Ramp = 0.2
 
 
 class SolverTable(Declared):
@@ -123,31 +126,194 @@ class OutputTable(Declared):
     rows: Annotated[int, Field(ge=2, le=100_000)] = 301
 
 
-class StudyModel(Declared):
-    """A forming study."""
+class Common(Declared):
+    """What every study says."""
 
     format: Literal[1] = 1
-    name: Annotated[str, Field(min_length=1)]
-    kind: Literal["forming"]
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^/\\\x00]+$")]
     description: str = ""
     fabric: FabricChoice
-    blank: BlankTable
-    tools: dict[str, ToolTable] = Field(min_length=1, max_length=8)
-    contact: dict[str, ContactTable]
-    loading: LoadingTable
     solver: SolverTable = SolverTable()
     output: OutputTable = OutputTable()
 
+
+class FormingModel(Common):
+    """A blank between rigid tools."""
+
+    kind: Literal["forming"]
+    blank: BlankTable
+    tools: dict[str, ToolTable] = Field(min_length=1, max_length=8)
+    contact: dict[str, ContactTable]
+    loading: FormingLoading
+
     @model_validator(mode="after")
-    def _pairs(self) -> StudyModel:
+    def _pairs(self) -> FormingModel:
+        names = ", ".join(self.tools)
         for name in self.contact:
             if name not in self.tools:
-                raise ValueError(
-                    f"[contact.{name}] names a tool that does not exist; the tools are {', '.join(self.tools)}"
-                )
+                raise ValueError(f"[contact.{name}] names a tool that does not exist; the tools are {names}")
         for name in self.tools:
             if name not in self.contact:
                 raise ValueError(f"tool {name} has no [contact.{name}]; every pair is named, with its friction")
-        if not any(tool.motion == "stroke" for tool in self.tools.values()):
-            raise ValueError('no tool moves: give one of them motion = "stroke"')
+        moving = [name for name, tool in self.tools.items() if tool.motion == "stroke"]
+        if len(moving) != 1:
+            raise ValueError(f'one tool makes the stroke (motion = "stroke"); here {len(moving)} do')
         return self
+
+
+class SpecimenTable(Declared):
+    """A rectangular specimen between two clamps, pulled along its length."""
+
+    length_mm: Positive
+    width_mm: Positive
+    cell_length_mm: Positive
+
+
+class TensileSpecimen(SpecimenTable):
+    """A specimen pulled along its warp or its weft."""
+
+    direction: Literal["warp", "weft"]
+
+
+class Pull(Declared):
+    """Displacement of the moving clamp [mm] in simulated time [s]."""
+
+    displacement_mm: Positive
+    duration_s: Positive
+    ramp: Ramp = 0.2
+
+
+class TensileModel(Common):
+    """A strip clamped at both ends and pulled along its yarns (Sec. 3.2)."""
+
+    kind: Literal["tensile"]
+    specimen: TensileSpecimen
+    loading: Pull
+
+
+class BiasModel(Common):
+    """A strip clamped at both ends and pulled at 45 degrees to its yarns (Secs. 2.3, 3.6)."""
+
+    kind: Literal["bias-extension"]
+    specimen: SpecimenTable
+    loading: Pull
+
+
+class FrameSpecimen(Declared):
+    """A square of fabric pinned along its edges in a square frame."""
+
+    frame_side_mm: Positive
+    fabric_side_mm: Positive
+    cell_length_mm: Positive
+
+    @model_validator(mode="after")
+    def _fits(self) -> FrameSpecimen:
+        if self.fabric_side_mm > self.frame_side_mm:
+            raise ValueError("the fabric is larger than the frame")
+        return self
+
+
+class FrameLoading(Declared):
+    """Shear angles that the frame passes through, one after the other, from zero."""
+
+    shear_angles_deg: list[Annotated[float, Field(gt=-85, lt=85, allow_inf_nan=False)]] = Field(min_length=1)
+    duration_s: Positive
+    ramp: Ramp = 0.2
+
+
+class FrameModel(Common):
+    """A picture frame; with several angles a cyclic shear test."""
+
+    kind: Literal["picture-frame"]
+    specimen: FrameSpecimen
+    loading: FrameLoading
+
+
+class BiaxialSpecimen(Declared):
+    """A rectangle whose edges are pulled along warp and weft and free to slide along themselves."""
+
+    warp_length_mm: Positive
+    weft_length_mm: Positive
+    cell_length_mm: Positive
+
+
+class BiaxialLoading(Declared):
+    """Nominal strains of warp and weft at the end; their quotient is the biaxial ratio."""
+
+    warp_strain: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)]
+    weft_strain: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)]
+    duration_s: Positive
+    ramp: Ramp = 0.2
+
+    @model_validator(mode="after")
+    def _moves(self) -> BiaxialLoading:
+        if self.warp_strain == self.weft_strain == 0.0:
+            raise ValueError("nothing is pulled: give warp_strain or weft_strain")
+        return self
+
+
+class BiaxialModel(Common):
+    """Biaxial tension with any ratio."""
+
+    kind: Literal["biaxial"]
+    specimen: BiaxialSpecimen
+    loading: BiaxialLoading
+
+
+class ElementTable(Declared):
+    """A single square cell."""
+
+    side_mm: Positive = 1.0
+
+
+class Move(Declared):
+    """One phase of an element test; exactly one of its values is given.
+
+    ``warp_stretch``: length of the warp over its initial length at the end of the phase; ``shear_angle_deg``: simple shear, the weft leans
+    towards the warp at constant height; ``rotation_deg``: a rigid turn, only as the last phase.
+    """
+
+    warp_stretch: Annotated[float, Field(gt=0.4, lt=2.5, allow_inf_nan=False)] | None = None
+    shear_angle_deg: Annotated[float, Field(gt=-65, lt=65, allow_inf_nan=False)] | None = None
+    rotation_deg: Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Move:
+        given = [v for v in (self.warp_stretch, self.shear_angle_deg, self.rotation_deg) if v is not None]
+        if len(given) != 1:
+            raise ValueError("a phase is one of warp_stretch, shear_angle_deg and rotation_deg")
+        return self
+
+
+class ElementLoading(Declared):
+    """Phases of equal duration."""
+
+    phases: list[Move] = Field(min_length=1, max_length=12)
+    duration_s: Positive
+    ramp: Ramp = 0.2
+
+    @model_validator(mode="after")
+    def _turn_last(self) -> ElementLoading:
+        if any(phase.rotation_deg is not None for phase in self.phases[:-1]):
+            raise ValueError("rotation_deg must be the last phase")
+        return self
+
+
+class ElementModel(Common):
+    """Elementary tests on one cell (Secs. 3.4 and 3.5, Tables 2 and 3)."""
+
+    kind: Literal["element"]
+    element: ElementTable = ElementTable()
+    loading: ElementLoading
+
+
+MODELS: dict[str, type[Common]] = {
+    "forming": FormingModel,
+    "tensile": TensileModel,
+    "bias-extension": BiasModel,
+    "picture-frame": FrameModel,
+    "biaxial": BiaxialModel,
+    "element": ElementModel,
+}
+
+StudyModel = FormingModel | TensileModel | BiasModel | FrameModel | BiaxialModel | ElementModel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -13,12 +14,25 @@ from typing import Any
 from shapely.geometry import Polygon
 
 from weftform.blank import YarnGrid, build_grid, disc, polygon, rectangle
-from weftform.declared import read_toml, validated
+from weftform.declared import line_of, read_toml, validated
 from weftform.errors import CardError, StudyError
 from weftform.fabric import Fabric
 from weftform.fabric.fabric import merge_tables
 from weftform.study.shipped import shipped_studies
-from weftform.study.schema import BlankTable, StudyModel, ToolTable
+from weftform.study.schema import (
+    MODELS,
+    BiasModel,
+    BlankTable,
+    Common,
+    ContactTable,
+    ElementModel,
+    FormingModel,
+    FrameModel,
+    StudyModel,
+    TensileModel,
+    ToolTable,
+)
+from weftform.study.specimens import specimen_grid
 from weftform.tooling import RigidTool, flat_punch, hemisphere, opening
 
 PLANES = {"full": (), "half-x": ("x",), "half-y": ("y",), "quarter": ("x", "y")}
@@ -67,7 +81,7 @@ class Study:
         pairs = changes.items() if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
         for key, value in pairs:
             values = _changed(values, key.split("."), value)
-        made = cls(validated(StudyModel, values, StudyError, file=path, text=text), path.resolve())
+        made = cls(_validated(values, path, text), path.resolve())
         try:
             made.check()
         except (StudyError, CardError) as problem:
@@ -77,9 +91,11 @@ class Study:
     def check(self) -> None:
         """Build everything that a run would build, so that what cannot work is refused before anything is written."""
         self.fabric  # noqa: B018
-        self._check_symmetry()
+        if isinstance(self.model, FormingModel):
+            self._check_symmetry(self.model.blank)
         self.grid  # noqa: B018
-        self._check_tools()
+        if isinstance(self.model, FormingModel):
+            self._check_tools(self.model)
 
     @property
     def name(self) -> str:
@@ -94,12 +110,25 @@ class Study:
 
     @cached_property
     def outline(self) -> Polygon:
-        """Declared outline of the blank in the plane of the press [mm]."""
-        return _outline(self.model.blank)
+        """Declared outline of the blank or specimen in its plane [mm]."""
+        model = self.model
+        if isinstance(model, FormingModel):
+            return _outline(model.blank)
+        if isinstance(model, ElementModel):
+            return rectangle(model.element.side_mm, model.element.side_mm)
+        if isinstance(model, FrameModel):
+            return rectangle(model.specimen.fabric_side_mm, model.specimen.fabric_side_mm)
+        if isinstance(model, TensileModel) and model.specimen.direction == "warp":
+            return rectangle(model.specimen.length_mm, model.specimen.width_mm)
+        if isinstance(model, (TensileModel, BiasModel)):
+            return rectangle(model.specimen.width_mm, model.specimen.length_mm)
+        return rectangle(model.specimen.warp_length_mm, model.specimen.weft_length_mm)
 
     @cached_property
     def grid(self) -> YarnGrid:
         """The yarn grid that covers the outline."""
+        if not isinstance(self.model, FormingModel):
+            return specimen_grid(self.model, self.outline)
         blank = self.model.blank
         return build_grid(
             self.outline,
@@ -111,10 +140,13 @@ class Study:
 
     @cached_property
     def tools(self) -> tuple[RigidTool, ...]:
-        """Rigid tools in the order of the study."""
-        return tuple(self._tool(name, table) for name, table in self.model.tools.items())
+        """Rigid tools in the order of the study; none in a laboratory test."""
+        if not isinstance(self.model, FormingModel):
+            return ()
+        contact = self.model.contact
+        return tuple(self._tool(name, table, contact[name]) for name, table in self.model.tools.items())
 
-    def _tool(self, name: str, table: ToolTable) -> RigidTool:
+    def _tool(self, name: str, table: ToolTable, contact: ContactTable) -> RigidTool:
         thickness = self.fabric.thickness
         up = 1.0 if table.side == "below" else -1.0
         if table.shape == "hemisphere":
@@ -126,7 +158,6 @@ class Study:
         else:
             assert table.hole_diameter_mm is not None and table.edge_radius_mm is not None
             shape = opening(table.hole_diameter_mm, table.edge_radius_mm, thickness, up)
-        contact = self.model.contact[name]
         return RigidTool(
             name,
             *shape,
@@ -139,8 +170,7 @@ class Study:
             mass=table.mass_kg * 1e-3 if table.mass_kg else None,
         )
 
-    def _check_symmetry(self) -> None:
-        blank = self.model.blank
+    def _check_symmetry(self, blank: BlankTable) -> None:
         eighths = blank.warp_angle_deg / 45.0
         odd = abs(eighths - round(eighths)) < 1e-9 and round(eighths) % 2 == 1
         if blank.symmetry != "full" and odd and not self.fabric.balanced:
@@ -151,10 +181,10 @@ class Study:
                 got=f'"{blank.symmetry}"',
             )
 
-    def _check_tools(self) -> None:
+    def _check_tools(self, model: FormingModel) -> None:
         smallest = min(math.hypot(*point) for point in self.outline.exterior.coords)
         nearest = self.outline.exterior.distance(_origin())
-        for name, table in self.model.tools.items():
+        for name, table in model.tools.items():
             hole = table.hole_diameter_mm
             if hole is None or table.edge_radius_mm is None:
                 continue
@@ -165,7 +195,7 @@ class Study:
                     expected=f"an edge more than {0.5 * hole + table.edge_radius_mm:g} mm from the axis everywhere",
                     got=f"{min(nearest, smallest):g} mm",
                 )
-            for other, punch in self.model.tools.items():
+            for other, punch in model.tools.items():
                 if punch.motion != "stroke" or punch.side == table.side or punch.diameter_mm is None:
                     continue
                 gap = 0.5 * (hole - punch.diameter_mm)
@@ -186,6 +216,24 @@ class Study:
             values["fabric"]["card"] = str((self.file.parent / self.model.fabric.card).resolve())
         text = tomlkit.dumps(values)
         return "".join(f"# {line}\n" for line in header.splitlines()) + text
+
+
+def _validated(values: dict[str, Any], path: Path, text: str) -> StudyModel:
+    """The tables checked against the model of their kind."""
+    kind = values.get("kind")
+    if not isinstance(kind, str) or kind not in MODELS:
+        close = difflib.get_close_matches(str(kind), MODELS, 1, 0.4)
+        raise StudyError(
+            "kind is missing" if kind is None else "no such kind of study",
+            file=path,
+            line=line_of(text, ("kind",)),
+            key="kind",
+            expected="one of " + ", ".join(MODELS),
+            got=None if kind is None else repr(kind),
+            hint=f"did you mean {close[0]}?" if close else None,
+        )
+    model: Common = validated(MODELS[kind], values, StudyError, file=path, text=text)
+    return model  # type: ignore[return-value]
 
 
 def _origin() -> Any:
@@ -242,8 +290,6 @@ def _changed(values: dict[str, Any], path: list[str], value: Any) -> dict[str, A
 
 def _placed(problem: StudyError | CardError, path: Path, text: str) -> StudyError | CardError:
     """The same error with the file and line of the study where it names a key of the study."""
-    from weftform.declared import line_of
-
     if problem.file is not None:
         return problem
     line = line_of(text, tuple(problem.key.split("."))) if problem.key else None
