@@ -1,7 +1,7 @@
 """Energies for the ledger, evaluated independently of the time loop.
 
 Energies of connectors, hourglass control and contact are functions of the state. The membrane's stress is a function of the state
-but, with constant thickness, has no potential, so its work is integrated with the trapezium rule from entry to entry. Friction and
+but, with constant thickness, has no potential, so its work is integrated with Simpson's rule from entry to entry. Friction and
 damping heat are sums of the time loop. The ledger therefore closes only if the time loop integrates the same physics.
 """
 
@@ -141,15 +141,21 @@ def enter_ledger(
             o2 = state[field + stride]
             oa = state[field + 2 * stride]
             ot = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], math.tan(0.5 * oa))
+            # Simpson's rule over the way since the last entry, straight in (ln l1, ln l2, gamma)
+            m1 = 0.5 * (e1 + o1)
+            m2 = 0.5 * (e2 + o2)
+            ma = 0.5 * (angle + oa)
+            mt = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], math.tan(0.5 * ma))
             new = math.exp(e1 + e2) * math.cos(angle)
+            mid = 4.0 * math.exp(m1 + m2) * math.cos(ma)
             old = math.exp(o1 + o2) * math.cos(oa)
             state[field + 3 * stride] += (
-                0.5
-                * volume
+                volume
+                / 6.0
                 * (
-                    membrane[2] * (new * e1 + old * o1) * (e1 - o1)
-                    + membrane[3] * (new * e2 + old * o2) * (e2 - o2)
-                    + (new * tau + old * ot) * (angle - oa)
+                    membrane[2] * (new * e1 + mid * m1 + old * o1) * (e1 - o1)
+                    + membrane[3] * (new * e2 + mid * m2 + old * o2) * (e2 - o2)
+                    + (new * tau + mid * mt + old * ot) * (angle - oa)
                 )
             )
             state[field] = e1

@@ -28,6 +28,8 @@ LEDGER_EVERY = 4
 """Surveys between entries of the energy ledger."""
 CONTACT_MARGIN = 0.25
 """Share of the thickness within which a row always counts as touching."""
+OUT_OF_THE_WAY = 1.0e5
+"""Height of crossings that are not part of the blank [mm]."""
 LOG_RANGE = 2.6
 """Largest stretch (and inverse of the smallest) for which the series of the logarithm is fitted."""
 LOG_TERMS = 14
@@ -217,7 +219,8 @@ class Simulation:
         rows, columns = self.rows, self.columns
         self._state = np.zeros((self._local_rows, layout.fields, layout.stride))
         fields = np.zeros((rows, layout.fields, layout.stride))
-        # padding and crossings outside the blank hold the flat grid, so that no vector loop divides by zero
+        # Padding and crossings outside the blank keep the flat grid's distances, so that no vector loop divides by
+        # zero, and lie where no crossing of the blank can run into them.
         u = (np.arange(layout.stride) - grid.centre[0]) * grid.warp_pitch
         v = (np.arange(rows) - grid.centre[1]) * grid.weft_pitch
         plan = grid.plan(np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1))
@@ -226,6 +229,8 @@ class Simulation:
         fields[:, at.POSITION : at.POSITION + 2, :columns][
             np.broadcast_to(grid.on_plane.transpose(0, 2, 1), (rows, 2, columns))
         ] = 0.0
+        fields[:, at.POSITION + 2] = OUT_OF_THE_WAY
+        fields[:, at.POSITION + 2, :columns][grid.active] = 0.0
         inertia = self.inertia_area
         with np.errstate(divide="ignore"):
             inverse = np.where(grid.active, 1.0 / (self.density * inertia), 0.0)
@@ -495,8 +500,9 @@ class Simulation:
 
     @property
     def positions(self) -> Floats:
-        """Positions of the crossings [mm], shape [rows, columns, 3]."""
-        return self._grid_field(at.POSITION)
+        """Positions of the crossings [mm], shape [rows, columns, 3]; flat where they are not part of the blank."""
+        grid = self.problem.grid
+        return np.where(grid.active[..., None], self._grid_field(at.POSITION), grid.flat)
 
     @property
     def velocities(self) -> Floats:
