@@ -310,6 +310,7 @@ class Run:
             "shear_angle_deg": fields.shear_statistics() if sound else None,
             "penetration_mm": self.peak_penetration,
             "penetration_share_of_thickness": self.peak_penetration / study.fabric.thickness,
+            "mass_scaling": study.model.solver.mass_scaling * simulation.largest_inertia,
             "blank": blank_summary(study),
         }
         if sound and self.rows:

@@ -76,5 +76,6 @@ class Case(ABC):
             damping=solver.damping_per_s,
             hourglass=solver.hourglass,
             safety=solver.safety,
+            least_step=solver.least_step_s,
             most_steps=solver.most_steps,
         )

@@ -60,7 +60,9 @@ C_STEP = 1
 C_LAST_STEP = 2
 C_STEPS_DONE = 3
 C_DRIVE_WORK = 4
-CLOCK_COLUMNS = 5
+C_INERTIA = 5
+"""Factor on all masses of the fabric (variable mass scaling)."""
+CLOCK_COLUMNS = 6
 
 IDENTITY, COSINE, SINE = 0, 1, 2
 """How a motion enters a direction of driven crossings: a, cos a - 1 or sin a."""
@@ -77,16 +79,18 @@ def _mode_amplitude(kind, value):
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
 def _sweep_band(
-    state, band, bands, first, last, columns, edge, node, membrane, series,
+    state, band, bands, first, last, spans, edge, node, membrane, series,
     warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
     tool_table, poses, touching, reactions, step, last_step, kick, keep, damping,
     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
 ):  # fmt: skip
-    """One step of the rows ``first`` to ``last`` (halos included) of a band."""
+    """One step of the rows ``first`` to ``last`` (halos included) of a band.
+
+    ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges (wider by what
+    its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
+    """
     flush_subnormals()
-    count = np.uint64(columns)
-    cells = np.uint64(columns - 1)
     for k in range(block):
         edge[block + k] = 0.0
         node[k] = 0.0
@@ -95,45 +99,48 @@ def _sweep_band(
     for r in range(first, own_last + 1):
         row = np.uint64(r) * np.uint64(row_length)
         if r >= own_first:
-            warp_row(state, row, count, edge, node, stride, warp_inverse, warp_degree, warp_pieces, warp_law)
+            begin = spans[r, 2]
+            warp_row(
+                state, row + np.uint64(begin), np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride,
+                warp_inverse, warp_degree, warp_pieces, warp_law,
+            )  # fmt: skip
         if r < last:
+            begin = spans[r, 4]
+            count = np.uint64(spans[r, 5])
             cell_row(
-                state, row, cells, edge, stride, row_length, half_cells, edge_weight, membrane,
-                shear_degree, shear_pieces, shear_law, series,
+                state, row + np.uint64(begin), count, edge[begin:], stride, row_length, half_cells, edge_weight,
+                membrane, shear_degree, shear_pieces, shear_law, series,
             )  # fmt: skip
             weft_row(
-                state, row, count, edge, node, stride, row_length, half_cells, weft_inverse,
-                weft_degree, weft_pieces, weft_law,
+                state, row + np.uint64(begin), count, edge[begin:], node[begin:], stride, row_length, half_cells,
+                weft_inverse, weft_degree, weft_pieces, weft_law,
             )  # fmt: skip
         else:
             for k in range(block):
                 node[k] = 0.0
         if r < own_first:
             continue
-        gather_row(count, edge, node, stride)
+        begin = spans[r, 0]
+        count = np.uint64(spans[r, 1])
+        place = row + np.uint64(begin)
+        edges = edge[begin:]
+        nodes = node[begin:]
+        gather_row(count, edges, nodes, stride)
         if driven:
-            keep_row(state, row, count, node, stride, force_field)
+            keep_row(state, place, count, nodes, stride, force_field)
         for k in range(tools):
             if touching[k, r] == ON_FACE:
                 reactions[k, r] = face_row(
-                    state,
-                    row,
-                    count,
-                    node,
-                    stride,
-                    first_tool + 4 * k,
-                    tool_table[k],
-                    poses[k, P_Z],
-                    last_step,
+                    state, place, count, nodes, stride, first_tool + 4 * k, tool_table[k], poses[k, P_Z], last_step
                 )
             elif touching[k, r] == TOUCHING:
                 reactions[k, r] = contact_row(
-                    state, row, count, node, stride, first_tool + 4 * k, tool_table[k],
+                    state, place, count, nodes, stride, first_tool + 4 * k, tool_table[k],
                     poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
                 )  # fmt: skip
             else:
                 reactions[k, r] = 0.0
-        update_row(state, row, count, node, stride, step, kick, keep, damping)
+        update_row(state, place, count, nodes, stride, step, kick, keep, damping)
 
 
 @cache
@@ -151,7 +158,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
 
     def advance(
-        state, bounds, halo_to, halo_from, columns, edge, node, membrane, series,
+        state, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
         warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
         tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha, density,
@@ -164,11 +171,12 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         amplitude = np.zeros(mode_motion.shape[0])
         step = clock[C_STEP]
         last_step = clock[C_LAST_STEP]
+        inertia = clock[C_INERTIA]
         while done < steps and clock[C_TIME] < stop:
             time = clock[C_TIME]
             mean_step = 0.5 * (step + last_step)
             keep = (1.0 - 0.5 * alpha * mean_step) / (1.0 + 0.5 * alpha * mean_step)
-            kick = mean_step / (1.0 + 0.5 * alpha * mean_step)
+            kick = mean_step / ((1.0 + 0.5 * alpha * mean_step) * inertia)
             if driven:
                 for m in range(mode_motion.shape[0]):
                     k = mode_motion[m]
@@ -191,9 +199,9 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                     state[target_row + k] = state[source + k]
             for band in numba.prange(bands):
                 _sweep_band(
-                    state, band, bands, bounds[band, 0], bounds[band, 1], columns, edge[band], node[band], membrane,
+                    state, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band], node[band], membrane,
                     series, warp_law, weft_law, shear_law, warp_inverse, weft_inverse, tool_table, poses, touching,
-                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * mean_step,
+                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
                     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip

@@ -225,6 +225,9 @@ def keep_row(state, row, count, node, stride, field):
 @row_loop
 def sum_axial(node, count, axial):
     """Sum of a scratch row in four lanes, which a vector unit adds at once and always in the same order."""
+    # what an earlier, longer row left beyond the end of this one does not count
+    for k in range(3):
+        node[axial + count + np.uint64(k)] = 0.0
     a = 0.0
     b = 0.0
     c = 0.0

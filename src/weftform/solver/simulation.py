@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, loop, survey
 from weftform.solver import layout as at
 from weftform.solver.layout import Layout, stride_for
+from weftform.solver.spans import row_spans
 from weftform.tooling import RigidTool
 
 Floats = NDArray[np.float64]
@@ -79,7 +81,9 @@ class Settings:
     mass_scaling: float = 1.0
     damping: float = 0.0
     hourglass: float = 0.01
-    safety: float = 0.9
+    safety: float = 0.8
+    least_step: float = 0.0
+    """Below this step [s] the mass of the fabric is scaled up, uniformly and only as long as it takes."""
     most_steps: int = 20_000_000
 
 
@@ -184,6 +188,9 @@ class Simulation:
         self._place_tools()
         self._drive_crossings()
         self.clock = np.zeros(loop.CLOCK_COLUMNS)
+        self.clock[loop.C_INERTIA] = 1.0
+        self.largest_inertia = 1.0
+        self._inertia_work = 0.0
         self._surveys = 0
         self.last = self._survey()
         self._enter_ledger()
@@ -251,10 +258,15 @@ class Simulation:
         self._state[self._row_index] = fields
         if self._halo_to.size:
             self._state[self._halo_to] = fields[self._halo_row]
+        spans = row_spans(grid.active)
+        self._spans = np.zeros((self._local_rows, spans.shape[1]), np.int64)
+        self._spans[self._row_index] = spans
+        if self._halo_to.size:
+            self._spans[self._halo_to] = spans[self._halo_row]
         self._edge = np.zeros((self.bands, 4 * layout.block))
         self._node = np.zeros((self.bands, 3 * layout.block))
 
-    @property
+    @cached_property
     def inertia_area(self) -> Floats:
         """Area whose mass each crossing carries [mm2], shape [rows, columns].
 
@@ -342,9 +354,20 @@ class Simulation:
         cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + membrane[2] + membrane[3])
         crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
         contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
-        self.clock[loop.C_STEP] = self.problem.settings.safety * stability.stable_step(
-            crossing, contact, self.density * grid.cell_area
-        )
+        settings = self.problem.settings
+        step = settings.safety * stability.stable_step(crossing, contact, self.density * grid.cell_area)
+        scale = max(1.0, (settings.least_step / step) ** 2)
+        if scale != self.clock[loop.C_INERTIA]:
+            # heavier at the same speed: the energy that this adds is booked as work
+            self._inertia_work += self._kinetic_energy() * (scale / self.clock[loop.C_INERTIA] - 1.0)
+            self.clock[loop.C_INERTIA] = scale
+            self.largest_inertia = max(self.largest_inertia, scale)
+        self.clock[loop.C_STEP] = step * math.sqrt(scale)
+
+    def _kinetic_energy(self) -> float:
+        """Kinetic energy of the fabric [mJ]."""
+        speeds = np.einsum("jik,jik->ji", self.velocities, self.velocities)
+        return 0.5 * self.density * float(self.clock[loop.C_INERTIA]) * float((self.inertia_area * speeds).sum())
 
     def _choose_holder_mass(self) -> None:
         area = float(self.problem.grid.node_area.sum())
@@ -400,7 +423,7 @@ class Simulation:
             numba.set_num_threads(self.bands)
         return int(
             self._loop(
-                self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self.columns,
+                self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self._spans,
                 self._edge, self._node, tuple(self._membrane), self._loop_series, *self._loop_laws,
                 self._membrane[0], self._membrane[1],
                 self._tool_table, self._poses, self._touching, self._reactions,
@@ -455,6 +478,7 @@ class Simulation:
             "clock": self.clock.copy(),
             "driven": self._driven_state.copy(),
             "tools": self._tool_table.copy(),
+            "inertia": np.array([self.largest_inertia, self._inertia_work]),
         }
 
     def restore(self, saved: dict[str, Floats]) -> None:
@@ -475,6 +499,7 @@ class Simulation:
         self.clock[:] = saved["clock"]
         self._driven_state[:] = saved["driven"]
         self._tool_table[:] = saved["tools"]
+        self.largest_inertia, self._inertia_work = (float(v) for v in saved["inertia"])
         self.last = self._survey()
 
     # -- looking ---------------------------------------------------------------------------------------------------
@@ -517,7 +542,7 @@ class Simulation:
     @property
     def masses(self) -> Floats:
         """Mass of each crossing [tonne], shape [rows, columns]."""
-        return self.density * self.inertia_area
+        return self.density * float(self.clock[loop.C_INERTIA]) * self.inertia_area
 
     @property
     def driven_forces(self) -> Floats:
@@ -565,14 +590,17 @@ class Simulation:
         tools = self._poses
         mass = self._tool_table[:, loop.T_MASS]
         return Ledger(
-            kinetic=float(entry[energies.KINETIC] + 0.5 * (mass * tools[:, loop.P_VELOCITY] ** 2).sum()),
+            kinetic=float(
+                self.clock[loop.C_INERTIA] * entry[energies.KINETIC]
+                + 0.5 * (mass * tools[:, loop.P_VELOCITY] ** 2).sum()
+            ),
             connectors=float(entry[energies.CONNECTORS]),
             membrane=float(entry[energies.MEMBRANE]),
             hourglass=float(entry[energies.HOURGLASS]),
             contact=float(entry[energies.CONTACT]),
             friction=float(entry[energies.FRICTION]),
             damping=float(entry[energies.DAMPED] + tools[:, loop.P_DAMPED].sum()),
-            work=float(tools[:, loop.P_WORK].sum() + self.clock[loop.C_DRIVE_WORK]),
+            work=float(tools[:, loop.P_WORK].sum() + self.clock[loop.C_DRIVE_WORK]) + self._inertia_work,
         )
 
 

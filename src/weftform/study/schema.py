@@ -115,7 +115,8 @@ class SolverTable(Declared):
     mass_scaling: Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)] = 1.0
     damping_per_s: NotNegative = 0.0
     hourglass: NotNegative = 0.01
-    safety: Annotated[float, Field(gt=0, le=0.98, allow_inf_nan=False)] = 0.9
+    safety: Annotated[float, Field(gt=0, le=0.98, allow_inf_nan=False)] = 0.8
+    least_step_s: NotNegative = 0.0
     most_steps: Annotated[int, Field(gt=0, le=1_000_000_000)] = 20_000_000
 
 
