@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from weftform.report.style import COLOURS, FAINT, INK, headline, new_figure, place, run_words, way_word
@@ -28,7 +28,7 @@ ENERGIES = (
     ("friction_energy_mJ", "friction", COLOURS["orange"], "solid"),
     ("internal_energy_mJ", "internal", COLOURS["blue"], "solid"),
     ("damping_energy_mJ", "damping", COLOURS["green"], "solid"),
-    ("contact_energy_mJ", "contact penalty", COLOURS["violet"], "solid"),
+    ("contact_energy_mJ", "contact", COLOURS["violet"], "solid"),
     ("kinetic_energy_mJ", "kinetic", COLOURS["red"], "solid"),
 )
 """Columns of the history that the figure of energies shows: name, label, colour, line style."""
@@ -68,7 +68,7 @@ def force_figure(result: Result, frame: int, force: str = "Force") -> Figure:
 
 def energies_figure(result: Result, frame: int) -> Figure:
     """Energy ledger of the whole blank against displacement, and kinetic over internal energy with its limit."""
-    figure = new_figure(6.6, 6.3)
+    figure = new_figure(6.7, 6.3)
     upper = place(figure, 0.78, 2.72, 4.4, 3.02)
     lower = place(figure, 0.78, 0.98, 4.4, 1.4)
     lower.sharex(upper)
@@ -88,6 +88,8 @@ def _ledger(axes: Axes, result: Result) -> None:
     """Energies on a logarithmic axis, named where they end."""
     history = result.history
     way = history["displacement_mm"]
+    # while the holder closes all energies stand above one another at no stroke
+    moving = np.append(way[1:] > 0.0, True)
     known = [(history[column], *rest) for column, *rest in ENERGIES if column in history]
     most = max((float(np.abs(values).max()) for values, *_ in known), default=0.0) or 1.0
     floor = 1e-5 * most
@@ -95,12 +97,12 @@ def _ledger(axes: Axes, result: Result) -> None:
     axes.set_yscale("log")
     axes.set_ylim(floor, 3.0 * most)
     axes.yaxis.set_major_locator(LogLocator(10.0, numticks=12))
-    axes.yaxis.set_minor_locator(LogLocator(10.0, subs=(), numticks=12))
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.set_ylabel("energy  [mJ]")
     names: list[tuple[float, str, str]] = []
     for values, label, colour, dashes in known:
-        shown = np.where(values > floor, values, np.nan)
+        shown = np.where((values > floor) & moving, values, np.nan)
         axes.plot(way, shown, color=colour, ls=dashes, lw=1.6, label=label, zorder=4 if dashes == "solid" else 5)
         last = values[-1]
         if np.nanmax(values) > floor:
@@ -119,9 +121,9 @@ def _kinetic_share(axes: Axes, result: Result) -> None:
     limit = 100.0 * LIMIT_KINETIC
     axes.grid(True)
     axes.set_yscale("log")
-    axes.set_ylim(1e-3, 200.0)
+    axes.set_ylim(5e-3, 200.0)
     axes.yaxis.set_major_locator(LogLocator(100.0, numticks=8))
-    axes.yaxis.set_minor_locator(LogLocator(10.0, subs=(), numticks=12))
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.set_ylabel("kinetic / internal  [%]")
     axes.axhline(limit, color=COLOURS["red"], lw=1.0, ls=(0, (4, 2)))
@@ -191,4 +193,4 @@ def _plain(value: float, _: int | None = None) -> str:
 
 def _figures(value: float) -> str:
     """Three digits with the unit."""
-    return f"{value:.3g} mJ" if value < 1000.0 else f"{value:,.0f} mJ"
+    return f"{value:.3g} mJ" if value < 1000.0 else f"{1e-3 * value:.3g} J"

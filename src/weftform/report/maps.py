@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-YARN_SHADE = 0.74
-"""Brightness of the lines of the mesh relative to the cells they bound."""
+YARN_CONTRAST = 0.26
+"""How far the lines of the mesh differ from the cells they bound: darker on light cells, lighter on dark ones."""
 
 
 def oblique_map(result: Result, frame: int, shown: Quantity = QUANTITIES["shear"]) -> Figure:
@@ -79,8 +79,11 @@ def above_map(result: Result, frame: int, shown: Quantity = QUANTITIES["shear"])
     flat, _ = result.outline(frame)
     figure, axes, norm, caption_note = _plan(result, part, shown, float(np.abs(flat).max()))
     axes.plot(flat[:, 0], -flat[:, 1] if turned else flat[:, 1], color=FAINT, lw=0.9, ls=(0, (5, 3.5)), zorder=1)
-    _tool_circles(axes, result)
-    note = "Dashed: edge of the flat blank. " + ("Seen from below. " if turned else "") + caption_note
+    note = (
+        f"Dashed: edge of the flat blank. {_tool_circles(axes, result)}"
+        + ("Seen from below. " if turned else "")
+        + caption_note
+    )
     headline(figure, f"{shown.title} on the formed part, from above", run_words(result, frame, note.strip()))
     return figure
 
@@ -138,7 +141,7 @@ def draw_cells(
     """
     if len(polygons) > 12_000:
         width *= math.sqrt(12_000 / len(polygons))
-    lines = YARN_SHADE * faces
+    lines = _line_colours(faces)
     # a half cell has no yarn along its long side: its outline takes its own colour, its yarns come as open lines just above it
     yarns = polygons[triangle][:, [0, 1, 2, 1]]
     order = np.argsort(np.concatenate([near, near[triangle] + 1e-6]), kind="stable")
@@ -151,6 +154,13 @@ def draw_cells(
         PolyCollection(shapes, facecolors=fills, edgecolors=edges, linewidths=width, joinstyle="round", zorder=zorder),
         autolim=False,
     )
+
+
+def _line_colours(faces: Floats) -> Floats:
+    """Colours of the lines, shape [polygons, 3]: seen on dark cells as well as on light ones."""
+    lightness = faces @ np.array([0.299, 0.587, 0.114])
+    darker = np.clip((lightness - 0.16) / 0.16, 0.0, 1.0)[:, None]
+    return np.asarray(faces * (1.0 - darker * YARN_CONTRAST) + (1.0 - darker) * 0.55 * YARN_CONTRAST * (1.0 - faces))
 
 
 def colour_range(values: Floats) -> Normalize:
@@ -195,23 +205,29 @@ def _plan(result: Result, part: WholePart, shown: Quantity, reach: float) -> tup
     return figure, axes, norm, part.note()
 
 
-def _tool_circles(axes: Axes, result: Result) -> None:
-    """Edges of the tools in plan view: where the hole and the punch are."""
+def _tool_circles(axes: Axes, result: Result) -> str:
+    """Draw where the punch and the hole of the fixed tool are in plan view, and say so."""
+    words = {"stroke": "dotted", "fixed": "white circle"}
+    said = []
     for tool in result.study.tools:
-        if tool.motion == "force":
+        if tool.motion not in words:
             continue
         radius = tool.s0 + tool.side_s * tool.radius
         turn = np.linspace(0.0, 2.0 * math.pi, 181)
+        dotted = tool.motion == "stroke"
         axes.add_collection(
             LineCollection(
                 [radius * np.column_stack([np.cos(turn), np.sin(turn)])],
                 colors="white",
-                linewidths=0.8,
-                linestyles=[(0, (1, 1.6)) if tool.motion == "stroke" else "solid"],
+                linewidths=1.0 if dotted else 0.8,
+                linestyles=[(0, (1, 1.6)) if dotted else "solid"],
                 alpha=0.85,
                 zorder=4,
             )
         )
+        said.append(f"{words[tool.motion]}: {tool.name.replace('_', ' ')} Ø {2 * radius:g} mm")
+    words_said = "; ".join(said)
+    return f"{words_said[0].upper()}{words_said[1:]}. " if said else ""
 
 
 def _yarn_arrows(axes: Axes, result: Result, reach: float) -> None:
@@ -226,7 +242,7 @@ def _yarn_arrows(axes: Axes, result: Result, reach: float) -> None:
             arrowprops={"arrowstyle": "-|>", "color": "white", "lw": 1.3, "shrinkA": 0, "shrinkB": 0},
             zorder=5,
         )
-        axes.text(1.25 * length * x, 1.25 * length * y, name, color="white", size=8, ha="center", va="center", zorder=5)
+        axes.text(1.4 * length * x, 1.4 * length * y, name, color="white", size=8, ha="center", va="center", zorder=5)
 
 
 def _dome_down(positions: Floats) -> bool:

@@ -68,6 +68,6 @@ def shade(colours: Floats, normals: Floats, camera: Camera) -> Floats:
     half = (lamp + towards) / np.linalg.norm(lamp + towards)
     seen = normals * np.where(normals @ towards < 0.0, -1.0, 1.0)[:, None]
     diffuse = np.clip(seen @ lamp, 0.0, 1.0)
-    gleam = np.clip(seen @ half, 0.0, 1.0) ** 24
+    gleam = np.clip(seen @ half, 0.0, 1.0) ** 16
     lit = colours * (0.52 + 0.56 * diffuse)[:, None]
-    return np.asarray(np.clip(lit + 0.14 * gleam[:, None] * (1.0 - lit), 0.0, 1.0))
+    return np.asarray(np.clip(lit + 0.07 * gleam[:, None] * (1.0 - lit), 0.0, 1.0))

@@ -61,7 +61,7 @@ _SETTINGS: dict[str, Any] = {
     "legend.frameon": False,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
-    "path.simplify": True,
+    "path.simplify": False,
 }
 
 SYMMETRY_WORDS = {1: "full model", 2: "half model", 4: "quarter model"}
