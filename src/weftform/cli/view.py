@@ -11,7 +11,7 @@ import typer
 def view(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Result folder written by `weftform run`.")],
     stroke: Annotated[
-        float | None, typer.Option(help="Show the computed instant nearest to this stroke [mm]; the end without.")
+        float | None, typer.Option(help="Show the computed instant nearest to this stroke (mm); the end without.")
     ] = None,
     png: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write a picture to this file and open no window.")

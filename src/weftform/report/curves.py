@@ -153,7 +153,7 @@ def _kinetic_share(axes: Axes, result: Result) -> None:
 
 
 def _name_ends(axes: Axes, names: list[tuple[float, str, str]]) -> None:
-    """Write names to the right of a logarithmic axis at the height of their values, moved apart where they would touch."""
+    """Write names to the right of a logarithmic axis at the height of their values, moved apart where they touch."""
     if not names:
         return
     low, high = (float(np.log10(v)) for v in axes.get_ylim())

@@ -42,12 +42,8 @@ def outline_figure(result: Result, frame: int) -> Figure:
             axes.plot(1.12 * reach * np.array(x), 1.12 * reach * np.array(y), color=FAINT, lw=0.6, ls=(0, (8, 3, 1, 3)))
     corner = diagonal_angle(result.study.outline)
     found = draw_in(flat, formed, corner)
-    for name, words, angle in (
-        ("edge_x", "edge x", 0.0),
-        ("edge_y", "edge y", 0.5 * math.pi),
-        ("corner", "corner", corner),
-    ):
-        _arrow(axes, flat, angle, f"{words}  {found[name]:.2f} mm", found[name], reach)
+    for name, angle in (("edge_x", 0.0), ("edge_y", 0.5 * math.pi), ("corner", corner)):
+        _arrow(axes, flat, angle, f"{name.replace('_', ' ')}\n{found[name]:.2f} mm", found[name], reach)
     axes.legend(loc="center", bbox_to_anchor=(0.36, 0.36), handlelength=2.6)
     note = "Dash-dotted: planes of symmetry of the model." if result.grid.planes else ""
     headline(figure, "Draw-in of the blank's edge", run_words(result, frame, note))
@@ -79,14 +75,16 @@ def _arrow(axes: Axes, flat: Floats, angle: float, words: str, inward: float, re
     )
     inner = (min(distance, distance - inward) - 0.04 * reach) * direction
     axes.text(
-        *inner,
+        float(inner[0]),
+        float(inner[1]),
         words,
         color=INK,
         size=9,
         weight="bold",
         ha="right" if direction[0] > 0.3 else "center",
         va="center" if direction[1] < 0.3 else "top",
-        bbox={"boxstyle": "square,pad=0.15", "facecolor": "#e4ecf5", "edgecolor": "none"},
+        linespacing=1.25,
+        bbox={"boxstyle": "square,pad=0.1", "facecolor": "#e4ecf5", "edgecolor": "none"},
         zorder=6,
     )
 

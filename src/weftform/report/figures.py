@@ -1,7 +1,7 @@
 """The figures of a result: which there are for each kind of study, and writing them.
 
-A kind of study has a figure set, a function that makes named figures one after another; :func:`register_figures` adds one. Kinds
-without a set of their own get force, energies and the shear angle on the deformed shape.
+A kind of study has a figure set, a function that makes named figures one after another; :func:`register_figures` adds
+one. Kinds without a set of their own get force, energies and the shear angle on the deformed shape.
 """
 
 from __future__ import annotations

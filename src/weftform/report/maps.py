@@ -77,13 +77,10 @@ def above_map(result: Result, frame: int, shown: Quantity = QUANTITIES["shear"])
     turned = _dome_down(fields.positions[result.grid.active])
     part = shown.on_whole_part(fields, _upright(fields.positions, turned))
     flat, _ = result.outline(frame)
-    figure, axes, norm, caption_note = _plan(result, part, shown, float(np.abs(flat).max()))
+    figure, axes, drawn = _plan(result, part, shown, float(np.abs(flat).max()))
     axes.plot(flat[:, 0], -flat[:, 1] if turned else flat[:, 1], color=FAINT, lw=0.9, ls=(0, (5, 3.5)), zorder=1)
-    note = (
-        f"Dashed: edge of the flat blank. {_tool_circles(axes, result)}"
-        + ("Seen from below. " if turned else "")
-        + caption_note
-    )
+    side = "Seen from below. " if turned else ""
+    note = f"Dashed: edge of the flat blank. {_tool_circles(axes, result)}{side}{drawn}"
     headline(figure, f"{shown.title} on the formed part, from above", run_words(result, frame, note.strip()))
     return figure
 
@@ -92,7 +89,7 @@ def flat_map(result: Result, frame: int, shown: Quantity = QUANTITIES["shear"]) 
     """The field at an instant, drawn on the flat blank where the material came from."""
     fields = result.fields(frame)
     part = shown.on_whole_part(fields, result.grid.flat)
-    figure, axes, norm, note = _plan(result, part, shown, float(np.abs(part.corners[..., :2]).max()))
+    figure, axes, note = _plan(result, part, shown, float(np.abs(part.corners[..., :2]).max()))
     _yarn_arrows(axes, result, float(np.abs(part.corners[..., :2]).max()))
     headline(figure, f"{shown.title} on the flat blank", run_words(result, frame, note))
     return figure
@@ -104,7 +101,7 @@ def deformed_map(result: Result, frame: int, shown: Quantity = QUANTITIES["shear
     part = shown.on_whole_part(fields)
     flat, _ = result.outline(frame)
     reach = max(float(np.abs(flat).max()), float(np.abs(part.corners[..., :2]).max()))
-    figure, axes, _, note = _plan(result, part, shown, reach)
+    figure, axes, note = _plan(result, part, shown, reach)
     axes.plot(*flat.T, color=FAINT, lw=0.9, ls=(0, (5, 3.5)), zorder=1)
     headline(
         figure,
@@ -142,7 +139,7 @@ def draw_cells(
     if len(polygons) > 12_000:
         width *= math.sqrt(12_000 / len(polygons))
     lines = _line_colours(faces)
-    # a half cell has no yarn along its long side: its outline takes its own colour, its yarns come as open lines just above it
+    # a half cell has no yarn along its long side: its outline takes its own colour and its yarns come just above it
     yarns = polygons[triangle][:, [0, 1, 2, 1]]
     order = np.argsort(np.concatenate([near, near[triangle] + 1e-6]), kind="stable")
     shapes = np.concatenate([polygons, yarns])[order]
@@ -151,7 +148,9 @@ def draw_cells(
         [np.column_stack([faces, np.ones(len(faces))]), np.zeros((int(triangle.sum()), 4))],
     )[order]
     axes.add_collection(
-        PolyCollection(shapes, facecolors=fills, edgecolors=edges, linewidths=width, joinstyle="round", zorder=zorder),
+        PolyCollection(
+            list(shapes), facecolors=fills, edgecolors=edges, linewidths=width, joinstyle="round", zorder=zorder
+        ),
         autolim=False,
     )
 
@@ -185,7 +184,7 @@ def colour_bar(figure: Figure, norm: Normalize, shown: Quantity, box: tuple[floa
     bar.set_label(shown.label, size=8.5, labelpad=5.0)
 
 
-def _plan(result: Result, part: WholePart, shown: Quantity, reach: float) -> tuple[Figure, Axes, Normalize, str]:
+def _plan(result: Result, part: WholePart, shown: Quantity, reach: float) -> tuple[Figure, Axes, str]:
     """A square picture in plan view, cells drawn, in mm."""
     side, left, bottom = 4.9, 0.68, 0.98
     figure = new_figure(left + side + 1.05, bottom + side + 0.5)
@@ -202,7 +201,7 @@ def _plan(result: Result, part: WholePart, shown: Quantity, reach: float) -> tup
     axes.set_xlabel("x  [mm]")
     axes.set_ylabel("y  [mm]")
     colour_bar(figure, norm, shown, (left + side + 0.18, bottom + 0.12 * side, 0.13, 0.76 * side))
-    return figure, axes, norm, part.note()
+    return figure, axes, part.note()
 
 
 def _tool_circles(axes: Axes, result: Result) -> str:

@@ -30,8 +30,8 @@ class Quantity:
     of
         The values of the cells, shape [rows - 1, columns - 1].
     across_bias
-        The values of the image in one plane of symmetry where yarns lie at 45 degrees to it, since warp and weft change places there; the same
-        values without.
+        The values of the image in one plane of symmetry where yarns lie at 45 degrees to it, since warp and weft change
+        places there; the same values without.
     """
 
     name: str

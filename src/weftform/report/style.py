@@ -1,4 +1,4 @@
-"""How every figure looks: one type size, quiet axes, a title that says what is shown and a caption that says what was run."""
+"""How every figure looks: quiet axes, a title that says what is shown, a caption that says what was run."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MAP = "viridis"
 """Perceptually uniform colour map of fields."""
 DPI = 200
 
-_SETTINGS: dict[str, Any] = {
+_SETTINGS: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "text.color": INK,
@@ -67,7 +67,7 @@ _SETTINGS: dict[str, Any] = {
 SYMMETRY_WORDS = {1: "full model", 2: "half model", 4: "quarter model"}
 
 
-def house_style() -> AbstractContextManager[None]:
+def house_style() -> AbstractContextManager[Any]:
     """The settings of matplotlib under which all figures are drawn; those of the caller come back afterwards."""
     return rc_context(_SETTINGS)
 

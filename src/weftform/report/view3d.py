@@ -10,6 +10,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -98,8 +99,8 @@ def show(result: Result, frame: int = -1, off_screen: Path | None = None, *, fie
     frame
         Index of the instant; in a window the slider starts there.
     off_screen
-        Write a picture (PNG) to this file and open no window. Without, a window opens if it can, else the picture goes to
-        ``figures/view.png`` in the result folder.
+        Write a picture (PNG) to this file and open no window. Without, a window opens if it can, else the picture goes
+        to ``figures/view.png`` in the result folder.
     field
         Name of the field, see :data:`weftform.report.quantities.QUANTITIES`.
 
@@ -169,12 +170,13 @@ class _Scene:
     """Blank, lines of its mesh and tools in a pyvista plotter."""
 
     def __init__(self, result: Result, frame: int, shown: Quantity, *, off_screen: bool) -> None:
-        import pyvista
+        from matplotlib import colormaps
         from vtkmodules.vtkCommonCore import vtkLogger
 
         from weftform.report.maps import colour_range
-        from weftform.report.style import MAP, house_style, run_words
+        from weftform.report.style import MAP, run_words
 
+        pyvista: Any = import_module("pyvista")
         # VTK warns on the terminal that there is no display, which is known
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
         self.result, self.shown = result, shown
@@ -189,14 +191,14 @@ class _Scene:
         self.plotter.add_mesh(
             self.cloth,
             scalars="shown",
-            cmap=MAP,
-            clim=(norm.vmin, norm.vmax),
+            cmap=colormaps[MAP],
+            clim=[float(v) for v in (norm.vmin or 0.0, norm.vmax or 1.0)],
             lighting=True,
             ambient=0.35,
             diffuse=0.7,
             specular=0.08,
             scalar_bar_args={
-                "title": shown.label + "\n",
+                "title": f"{shown.title} [{shown.unit}]\n",
                 "vertical": True,
                 "position_x": 0.9,
                 "position_y": 0.22,
@@ -213,14 +215,12 @@ class _Scene:
         self.plotter.add_mesh(self.yarns, color="#101418", opacity=0.22, line_width=1.0, lighting=False)
         self.tools = self._add_tools(frame)
         self.caption = run_words
-        with house_style():
-            self._label(frame)
+        self._label(frame)
         self._aim()
 
     def _add_tools(self, frame: int) -> list[tuple[RigidTool, Any]]:
         """Translucent surfaces of the tools."""
-        import pyvista
-
+        pyvista: Any = import_module("pyvista")
         reach = 0.95 * float(np.abs(self.result.grid.flat[self.result.grid.active]).max())
         depth = 0.25 * reach
         added = []
@@ -244,11 +244,10 @@ class _Scene:
         heights = self.result.fields(-1).positions[self.result.grid.active][:, 2]
         down = -heights.min() > heights.max()
         reach = float(np.abs(self.result.grid.flat[self.result.grid.active]).max())
-        middle = 0.35 * float(heights.min() if down else heights.max())
         towards = Camera(-64.0, -33.0 if down else 33.0, 1.0).axes[2]
-        target = np.array([0.0, 0.0, middle])
+        target = np.array([0.0, 0.0, 0.08 * reach if down else -0.08 * reach])
         self.plotter.camera_position = [tuple(target + 5.0 * reach * towards), tuple(target), (0.0, 0.0, 1.0)]
-        self.plotter.camera.view_angle = 26.0
+        self.plotter.camera.view_angle = 22.0
 
     def _label(self, frame: int) -> None:
         words = self.caption(self.result, frame)

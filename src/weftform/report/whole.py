@@ -1,4 +1,4 @@
-"""The whole part as polygons, mirrored from the modelled half or quarter, coarsened where there is more than a picture can show."""
+"""The whole part as polygons, mirrored from the modelled half or quarter, coarsened where a picture cannot show all."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Patches:
     Attributes
     ----------
     nodes
-        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner, and its first three
-        corners run along its two yarns.
+        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner, and its first
+        three corners run along its two yarns.
     triangle
         Whether each is a half cell, shape [polygons].
     places
@@ -90,7 +90,8 @@ class WholePart:
         """What the caption has to say about the drawing."""
         if self.stride == 1:
             return ""
-        return f"Drawn in blocks of {self.stride} × {self.stride} cells (mean values; every {self.stride}th line of the mesh)."
+        n = self.stride
+        return f"Drawn in blocks of {n} × {n} cells: mean values, one in {n} lines of the mesh."
 
 
 def patches(grid: YarnGrid, most: int = MOST_DRAWN) -> Patches:
@@ -99,8 +100,8 @@ def patches(grid: YarnGrid, most: int = MOST_DRAWN) -> Patches:
     Parameters
     ----------
     most
-        Cells of the whole part that may be drawn one by one; beyond, whole cells go together in square blocks as far as they fill
-        them, so that the edge of the blank stays as it is.
+        Cells of the whole part that may be drawn one by one; beyond, whole cells go together in square blocks as far as they
+        fill them, so that the edge of the blank stays as it is.
     """
     stride = max(1, math.ceil(math.sqrt(grid.cell_count * grid.copies / most)))
     columns = grid.shape[1]
