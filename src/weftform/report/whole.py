@@ -25,8 +25,8 @@ class Patches:
     Attributes
     ----------
     nodes
-        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner, and its first
-        three corners run along its two yarns.
+        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner; its first three
+        corners run along its two yarns.
     triangle
         Whether each is a half cell, shape [polygons].
     places
@@ -100,8 +100,8 @@ def patches(grid: YarnGrid, most: int = MOST_DRAWN) -> Patches:
     Parameters
     ----------
     most
-        Cells of the whole part that may be drawn one by one; beyond, whole cells go together in square blocks as far as they
-        fill them, so that the edge of the blank stays as it is.
+        Cells of the whole part that may be drawn one by one; beyond, whole cells go together in square blocks as far
+        as they fill them, so that the edge of the blank stays as it is.
     """
     stride = max(1, math.ceil(math.sqrt(grid.cell_count * grid.copies / most)))
     columns = grid.shape[1]
