@@ -57,15 +57,15 @@ def test_picture_with_pyvista(along_bias, headless, tmp_path):
 
 
 def test_tools_are_where_they_were(along_yarns):
-    """The punch touches the fabric's underside where it pushes it: the top of its surface is half a thickness below."""
+    """The top of the punch starts half a thickness below the middle of the flat fabric, and makes the stroke."""
     punch = next(t for t in along_yarns.study.tools if t.motion == "stroke")
-    _, _, z = view3d.tool_surface(punch, 75.0, 20.0)
-    top = z.max() + view3d.tool_way(along_yarns, punch, len(along_yarns.strokes) - 1)
-    highest = along_yarns.fields().positions[along_yarns.grid.active][:, 2].max()
-    # Penetration is below 5 % of the thickness.
-    thickness = along_yarns.fabric.thickness
-    assert highest - top == pytest.approx(0.5 * thickness, abs=0.05 * thickness)
-    assert np.isfinite(z).all()
+    x, y, z = view3d.tool_surface(punch, 75.0, 20.0)
+    assert z.max() == pytest.approx(-0.5 * along_yarns.fabric.thickness)
+    assert np.hypot(x, y).max() == pytest.approx(25.0)
+    last = len(along_yarns.strokes) - 1
+    assert [view3d.tool_way(along_yarns, punch, k) for k in (0, last)] == pytest.approx([0.0, 30.0])
+    die = next(t for t in along_yarns.study.tools if t.motion == "fixed")
+    assert view3d.tool_way(along_yarns, die, last) == 0.0
 
 
 def test_command_says_where_the_picture_is(along_yarns, headless, without_pyvista):

@@ -25,8 +25,8 @@ class Patches:
     Attributes
     ----------
     nodes
-        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner; its first three
-        corners run along its two yarns.
+        Flat node indices of the corners in order, shape [polygons, 4]. A half cell repeats its last corner; its
+        first three corners run along its two yarns.
     triangle
         Whether each is a half cell, shape [polygons].
     places
