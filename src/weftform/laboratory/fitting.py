@@ -1,0 +1,340 @@
+"""Least squares for a polynomial law: over all points of all specimens, monotone, with a band that means something.
+
+The unknowns are the coefficients of ``c1 x + c2 x^2 + ...``; the measured quantity is any linear function of them, so the
+tensile force (Eq. 3) and the bias-extension force (Eq. 7) are fitted by the same lines of code. Specimens, not points, are
+the independent repetitions of a test: neighbouring points of one curve share its errors. The band therefore comes from how
+much the specimens differ from each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from weftform.errors import MeasurementError
+from weftform.fabric.laws import Floats, PolynomialLaw
+
+Weighting = Literal["uniform", "relative"]
+SIMULATIONS = 4000
+"""Draws that give the critical value of a simultaneous band (its own error is then about 2 %)."""
+LEAST_SLOPE = 1.0e-6
+"""Smallest slope of a monotone fit, relative to its mean slope; keeps rounding from turning 0 into a fall."""
+RELATIVE_FLOOR = 0.02
+"""Relative weighting counts every value as at least this share of the largest, or the first points would rule."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """A band around a fitted curve: arrays of one shape, ``lower <= centre <= upper``.
+
+    ``critical`` is the number of standard errors to either side.
+    """
+
+    lower: Floats
+    centre: Floats
+    upper: Floats
+    critical: float
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialFit:
+    """A polynomial fitted to the curves of one or more specimens.
+
+    Attributes
+    ----------
+    powers
+        Exponent of each coefficient, shape [p]: 1..degree, with 0 in front where the origin is not imposed.
+    coefficients
+        Shape [p], monotone where that was asked for.
+    free_coefficients
+        Shape [p], without the monotone constraint; the same where it does not act.
+    covariance
+        Of ``free_coefficients``, shape [p, p].
+    deviations
+        Of the coefficients of each specimen from the mean, shape [specimens, p]; empty for one specimen.
+    valid_to
+        End of the validity, in the variable of the polynomial.
+    specimens, points
+        How many were used.
+    rms
+        Root mean square of the residuals of all points [unit of the response].
+    r_squared
+        1 - residual / total sum of squares.
+    constrained
+        Whether the monotone constraint acts.
+    freedom
+        Degrees of freedom of the covariance.
+    """
+
+    powers: tuple[int, ...]
+    coefficients: Floats
+    free_coefficients: Floats
+    covariance: Floats
+    deviations: Floats
+    valid_to: float
+    specimens: int
+    points: int
+    rms: float
+    r_squared: float
+    constrained: bool
+    freedom: int
+    _critical: dict[tuple[object, ...], float] = field(default_factory=dict, repr=False)
+
+    @property
+    def standard_errors(self) -> Floats:
+        """Of the coefficients, shape [p]."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def constant(self) -> float:
+        """Value at zero; 0 where the origin is imposed."""
+        return float(self.coefficients[0]) if self.powers[0] == 0 else 0.0
+
+    @property
+    def law_coefficients(self) -> tuple[float, ...]:
+        """Coefficients of x, x^2, ..."""
+        return tuple(float(c) for c, k in zip(self.coefficients, self.powers, strict=True) if k > 0)
+
+    def law(self) -> PolynomialLaw:
+        """The fit as a law of :mod:`weftform.fabric`."""
+        return PolynomialLaw(self.law_coefficients, self.valid_to, self.constant)
+
+    def basis(self, x: Floats, kind: Literal["value", "slope"] = "value") -> Floats:
+        """Values or slopes of the powers at ``x``, shape [len(x), p]."""
+        return power_basis(np.asarray(x, float), self.powers, kind)
+
+    def band(
+        self,
+        x: Floats,
+        *,
+        kind: Literal["value", "slope"] = "value",
+        level: float = 0.95,
+        simultaneous: bool = True,
+    ) -> Band:
+        """Confidence band of the curve or of its slope at ``x`` (shape [m]).
+
+        A simultaneous band holds the whole true curve over ``x`` with the stated probability; a pointwise one
+        holds it at any one place, and is narrower. The critical value is the quantile of ``max |mean| / standard error`` over simulated
+        sets of as many specimens with the covariance found (one specimen: of a multivariate t); seeded, so always the same.
+        The band is widened, never narrowed, to hold the monotone fit where the constraint acts.
+
+        Raises
+        ------
+        ValueError
+            ``level`` is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level must lie between 0 and 1, got {level}")
+        x = np.atleast_1d(np.asarray(x, float))
+        basis = self.basis(x, kind)
+        free = basis @ self.free_coefficients
+        error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, self.covariance, basis), 0.0))
+        key = (kind, level, simultaneous, x.tobytes())
+        if key not in self._critical:
+            self._critical[key] = (
+                self._simultaneous(basis, level) if simultaneous else _student(level, self.freedom)
+            )
+        critical = self._critical[key]
+        centre = basis @ self.coefficients
+        return Band(
+            np.minimum(free - critical * error, centre), centre, np.maximum(free + critical * error, centre), critical
+        )
+
+    def _simultaneous(self, basis: Floats, level: float) -> float:
+        rng = np.random.default_rng(0)
+        if self.specimens > 1:
+            n = self.specimens
+            curves = self.deviations @ basis.T / np.sqrt(n - 1)  # [n, m], covariance of one specimen
+            used = np.linalg.norm(curves, axis=0) > 1e-12 * max(float(np.linalg.norm(curves, axis=0).max()), 1e-300)
+            if not used.any():
+                return _student(level, self.freedom)
+            draws = rng.standard_normal((SIMULATIONS, n, n)) @ curves[:, used]
+            ratio = np.abs(draws.mean(axis=1)) / (draws.std(axis=1, ddof=1) / np.sqrt(n))
+        else:
+            scale, turn = np.linalg.eigh(self.covariance)
+            root = turn * np.sqrt(np.maximum(scale, 0.0))
+            curves = basis @ root
+            length = np.linalg.norm(curves, axis=1)
+            curves = curves[length > 0.0] / length[length > 0.0, None]
+            if not curves.size:
+                return _student(level, self.freedom)
+            chi = np.sqrt(rng.chisquare(self.freedom, SIMULATIONS) / self.freedom)
+            ratio = np.abs(rng.standard_normal((SIMULATIONS, len(root))) @ curves.T) / chi[:, None]
+        return float(np.quantile(ratio.max(axis=1), level))
+
+
+def _student(level: float, freedom: int) -> float:
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + 0.5 * level, freedom))
+
+
+def power_basis(x: Floats, powers: Sequence[int], kind: Literal["value", "slope"] = "value") -> Floats:
+    """``x^k``, or its derivative, for each ``k`` of ``powers``; shape [len(x), len(powers)]."""
+    k = np.asarray(powers, float)
+    if kind == "value":
+        return np.asarray(x[:, None] ** k)
+    return np.asarray(k * x[:, None] ** np.maximum(k - 1.0, 0.0))
+
+
+def fit_polynomial(
+    designs: Sequence[Floats],
+    responses: Sequence[Floats],
+    powers: Sequence[int],
+    valid_to: float,
+    *,
+    monotone: bool = True,
+    weighting: Weighting = "uniform",
+) -> PolynomialFit:
+    """Fit the coefficients over all points, each specimen with the same weight.
+
+    Parameters
+    ----------
+    designs
+        Per specimen, the linear map from the coefficients to its measured values, shape [points, p].
+    responses
+        Per specimen, its measured values, shape [points].
+    powers
+        Exponents of the polynomial, shape [p].
+    valid_to
+        End of the interval on which the polynomial must rise.
+    monotone
+        Impose a rising polynomial on ``[0, valid_to]``.
+    weighting
+        ``uniform`` (errors of one size along the curve) or ``relative`` (errors in proportion to the value).
+
+    Raises
+    ------
+    MeasurementError
+        Fewer points than coefficients, or points that do not tell the coefficients apart.
+
+    Notes
+    -----
+    The covariance of the mean over ``n`` specimens is that of their scores (the cluster-robust or sandwich estimate), which for
+    specimens sampled alike is the covariance of the separately fitted coefficients divided by ``n``. A single specimen has no
+    such scatter: the covariance then comes from the residuals, corrected for their correlation along the curve.
+    """
+    p, n = len(powers), len(designs)
+    points = sum(len(r) for r in responses)
+    if points < p + 2 or min(len(r) for r in responses) < 2:
+        raise MeasurementError(
+            f"too few points for a polynomial with {p} coefficients",
+            expected=f"{p + 2} points at least in the interval",
+            got=f"{points}",
+            hint="lower the degree, or widen the interval",
+        )
+    scale = float(valid_to) ** np.asarray(powers, float)
+    largest = max(float(np.abs(r).max()) for r in responses) or 1.0
+    rows = [d / scale / np.sqrt(len(d)) for d in designs]
+    values = [r / np.sqrt(len(r)) for r in responses]
+    if np.linalg.matrix_rank(np.vstack(rows)) < p:
+        raise MeasurementError(
+            f"the points do not determine {p} coefficients",
+            expected="points spread over the whole interval",
+            hint="lower the degree, or widen the interval",
+        )
+    free = np.linalg.lstsq(np.vstack(rows), np.concatenate(values), rcond=None)[0]
+    if weighting == "relative":
+        # Weights from the first fit, not from the noisy values: those would favour every point that errs downwards.
+        sizes = [np.maximum(np.abs(d @ (free / scale)) / largest, RELATIVE_FLOOR) for d in designs]
+        rows = [r / size[:, None] for r, size in zip(rows, sizes, strict=True)]
+        values = [v / size for v, size in zip(values, sizes, strict=True)]
+        free = np.linalg.lstsq(np.vstack(rows), np.concatenate(values), rcond=None)[0]
+    a, y = np.vstack(rows), np.concatenate(values)
+    bread = np.linalg.inv(a.T @ a)
+    if n > 1:
+        deviations = np.array([n * bread @ r.T @ (v - r @ free) for r, v in zip(rows, values, strict=True)])
+        covariance = deviations.T @ deviations / (n * (n - 1))
+        freedom = n - 1
+    else:
+        residual = y - a @ free
+        freedom = points - p
+        covariance = bread * float(residual @ residual) / freedom * _inflation(residual)
+        deviations = np.empty((0, p))
+    best = _rising(a, y, free, powers) if monotone else free
+    constrained = best is not free
+    fitted = [d @ (best / scale) for d in designs]
+    residuals = np.concatenate([r - f for r, f in zip(responses, fitted, strict=True)])
+    everything = np.concatenate(list(responses))
+    spread = float(((everything - everything.mean()) ** 2).sum())
+    return PolynomialFit(
+        powers=tuple(powers),
+        coefficients=best / scale,
+        free_coefficients=free / scale,
+        covariance=covariance / np.outer(scale, scale),
+        deviations=deviations / scale,
+        valid_to=float(valid_to),
+        specimens=n,
+        points=points,
+        rms=float(np.sqrt(np.mean(residuals**2))),
+        r_squared=1.0 - float(residuals @ residuals) / spread if spread > 0.0 else 0.0,
+        constrained=constrained,
+        freedom=freedom,
+    )
+
+
+def _inflation(residual: Floats) -> float:
+    """Variance inflation of residuals with lag-one correlation r: (1 + r) / (1 - r), never below 1."""
+    total = float(residual @ residual)
+    r = float(residual[1:] @ residual[:-1]) / total if total > 0.0 else 0.0
+    r = min(max(r, 0.0), 0.98)
+    return (1.0 + r) / (1.0 - r)
+
+
+def _rising(a: Floats, y: Floats, free: Floats, powers: Sequence[int]) -> Floats:
+    """The least-squares coefficients (x scaled to 0..1) whose polynomial rises; ``free`` itself where it does.
+
+    Slope constraints are put where the slope is smallest, solved, and put again until it falls nowhere.
+    """
+    places = np.linspace(0.0, 1.0, 65)
+    end = float(np.abs(power_basis(np.array([1.0]), powers) @ free)[0])
+    least = LEAST_SLOPE * max(end, 1e-300)
+    best = free
+    for _ in range(30):
+        worst = _lowest_slopes(best, powers)
+        slopes = power_basis(worst, powers, "slope") @ best
+        if (slopes >= 0.5 * least).all():
+            return best
+        places = np.unique(np.concatenate([places, worst]))
+        best = _bounded(a, y, power_basis(places, powers, "slope"), np.full(len(places), least))
+    raise MeasurementError(
+        "no rising polynomial of this degree follows the points",
+        hint="use another degree, a shorter interval, or a tabulated law",
+    )
+
+
+def _lowest_slopes(coefficients: Floats, powers: Sequence[int]) -> Floats:
+    """Ends of 0..1 and the places between where the slope has a minimum or maximum."""
+    dense = np.zeros(max(powers) + 1)
+    dense[list(powers)] = coefficients
+    roots = np.polynomial.Polynomial(dense).deriv(2).roots() if max(powers) > 2 else np.empty(0)
+    inside = np.real(roots[np.abs(np.imag(roots)) < 1e-9])
+    return np.concatenate([[0.0, 1.0], inside[(inside > 0.0) & (inside < 1.0)]])
+
+
+def _bounded(a: Floats, y: Floats, g: Floats, h: Floats) -> Floats:
+    """Minimise ``|a c - y|`` subject to ``g c >= h``: least distance programming on non-negative least squares.
+
+    Reference: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    from scipy.optimize import nnls
+
+    q, r = np.linalg.qr(a)
+    inverse = np.linalg.inv(r)
+    middle = q.T @ y
+    sides = g @ inverse
+    room = h - sides @ middle
+    norm = np.maximum(np.linalg.norm(sides, axis=1), 1e-300)
+    sides, room = sides / norm[:, None], room / norm
+    size = float(np.abs(room).max()) or 1.0
+    u, _ = nnls(np.vstack([sides.T, room[None, :] / size]), np.append(np.zeros(len(middle)), 1.0), maxiter=3000)
+    rest = np.append(sides.T @ u, room @ u / size - 1.0)
+    if abs(rest[-1]) < 1e-14:
+        raise MeasurementError(
+            "no rising polynomial of this degree exists", hint="use another degree, or a tabulated law"
+        )
+    z = -rest[:-1] / rest[-1] * size
+    return np.asarray(inverse @ (z + middle))
