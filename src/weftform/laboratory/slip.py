@@ -13,6 +13,7 @@ LEAST_DEPARTURE_DEG = 1.0
 """Departure at the end of the test below which it is not called slip, whatever its significance: marker tracking and
 the idealised kinematics agree no better than that."""
 FEWEST_POINTS = 10
+SHAPES = (("share",), ("even",), ("share", "even"), ("gradual",))
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,13 @@ def slip_onset(
 ) -> SlipOnset:
     """Find where the measured angle falls behind the kinematic one.
 
-    The lag ``kinematic - measured`` is a constant (the angle of the first image has an error too) up to the onset ``d0``, and
-    ``s (d - d0) + q (d - d0)^2`` more beyond it. For each ``d0`` the rest is linear; the best ``d0`` has the least sum of
-    squares. Against "constant throughout" it is judged by an F test whose probability is multiplied by the number of onsets
-    tried (Bonferroni); the interval holds every ``d0`` whose likelihood ratio is within the 95 % point of chi square.
+    The lag ``kinematic - measured`` is a constant (the angle of the first image has an error too) up to the onset ``d0``;
+    beyond it grows by a share of the further kinematic angle, by an even amount per mm, by both, or gradually with
+    ``(d - d0)^2``, whichever Bayes' information criterion prefers. A measured angle that stops, goes on at a lower share or at a lower even rate is
+    followed exactly. For each ``d0`` the rest is linear; the best ``d0`` has the least sum of squares. Against "constant
+    throughout" it is judged by an F test whose probability is multiplied by the number of onsets and shapes tried
+    (Bonferroni); the interval holds every ``d0`` that scores, with any shape, within the 95 % point of chi square of
+    the best. A gradual departure has a wide interval: its onset is not well defined.
 
     Parameters
     ----------
@@ -78,36 +82,67 @@ def slip_onset(
     n = len(d)
     if n < FEWEST_POINTS:
         return SlipOnset(None, None, None, 0.0, 0.0, np.nan)
-    span = float(d[-1] - d[0])
     tried = np.linspace(d[0], d[-3], 401)
     null = float(((lag - lag.mean()) ** 2).sum())
-    rest = np.empty(len(tried))
-    fits = np.empty((len(tried), 3))
-    for k, onset in enumerate(tried):
-        past = np.maximum(d - onset, 0.0) / span
-        a = np.column_stack([np.ones(n), past, past**2])
-        c = np.linalg.lstsq(a, lag, rcond=None)[0]
-        if c[1] < 0.0:  # a lag that first shrinks is no slip
-            c = np.zeros(3)
-            c[[0, 2]] = np.linalg.lstsq(a[:, [0, 2]], lag, rcond=None)[0]
-        fits[k], rest[k] = c, ((lag - a @ c) ** 2).sum()
-    best = int(np.argmin(rest))
-    smallest = max(float(rest[best]), 1e-12 * n)
-    noise = float(np.sqrt(smallest / max(n - 4, 1)))
-    onset = float(tried[best])
-    past = (d[-1] - onset) / span
-    departure = float(fits[best, 1] * past + fits[best, 2] * past**2)
-    ratio = max(null - smallest, 0.0) / 3.0 / (smallest / max(n - 4, 1))
-    chance = min(1.0, float(f.sf(ratio, 3, max(n - 4, 1))) * min(n, len(tried)))
+    fits = [_best_onset(d, lag, kinematic, tried, shape) for shape in SHAPES]
+    # Bayes' information criterion: constant, onset and shape are free.
+    scores = np.array(
+        [n * np.log(np.maximum(fit.squares, 1e-12 * n)) + (2 + fit.terms) * np.log(n) for fit in fits]
+    )
+    fit = fits[int(np.argmin(scores.min(axis=1)))]
+    freedom = max(n - 2 - fit.terms, 1)
+    smallest = max(fit.smallest, 1e-12 * n)
+    noise = float(np.sqrt(smallest / freedom))
+    onset, departure = fit.onset, fit.departure
+    ratio = max(null - smallest, 0.0) / (1 + fit.terms) / (smallest / freedom)
+    chance = min(1.0, float(f.sf(ratio, 1 + fit.terms, freedom)) * min(n, len(tried)) * len(fits))
     confidence = 1.0 - chance
     if confidence < least_confidence or departure < max(least_departure_deg, 2.0 * noise):
         return SlipOnset(None, None, None, confidence, departure, noise)
-    near = tried[n * np.log(np.maximum(rest, 1e-12 * n) / smallest) <= chi2.ppf(0.95, 1)]
+    near = tried[(scores <= scores.min() + chi2.ppf(0.95, 1)).any(axis=0)]
+    step = float(tried[1] - tried[0])
     return SlipOnset(
         displacement=onset,
-        interval=(float(near.min()), float(near.max())),
+        interval=(float(near.min()) - step, float(near.max()) + step),
         angle_deg=float(np.interp(onset, d, kinematic)),
         confidence=confidence,
         departure_deg=departure,
         noise_deg=noise,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _OnsetFit:
+    """The best onset of one shape of lag: sums of squares per onset tried, and the lag gained at the end [deg]."""
+
+    onset: float
+    squares: Floats
+    smallest: float
+    departure: float
+    terms: int
+
+
+def _best_onset(d: Floats, lag: Floats, kinematic: Floats, tried: Floats, shape: tuple[str, ...]) -> _OnsetFit:
+    squares, departures = np.empty(len(tried)), np.empty(len(tried))
+    rate = np.gradient(kinematic, d, edge_order=1) if np.all(np.diff(d) > 0) else np.ones(len(d))
+    for k, onset in enumerate(tried):
+        past = d > onset
+        columns = [np.ones(len(d))]
+        if "share" in shape:
+            columns.append(np.where(past, kinematic - np.interp(onset, d, kinematic), 0.0))
+        if "gradual" in shape:
+            columns.append(np.where(past, (d - onset) ** 2, 0.0))
+        if "even" in shape:
+            columns.append(np.where(past, d - onset, 0.0))
+        a = np.column_stack(columns)
+        c = np.linalg.lstsq(a, lag, rcond=None)[0]
+        first = float(c[1])
+        if shape == ("share", "even"):
+            first = float(c[1] * np.interp(onset, d, rate) + c[2])
+        if first < 0.0:  # a lag that first shrinks is no slip
+            squares[k], departures[k] = ((lag - lag.mean()) ** 2).sum(), 0.0
+            continue
+        squares[k] = ((lag - a @ c) ** 2).sum()
+        departures[k] = a[-1, 1:] @ c[1:]
+    best = int(np.argmin(squares))
+    return _OnsetFit(float(tried[best]), squares, float(squares[best]), float(departures[best]), len(shape))
