@@ -5,7 +5,7 @@ Angles in radians, lengths in mm, forces in N. See docs/theory/normalisation.md 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -52,27 +52,38 @@ def kinematic_displacement(angle: Floats | float, height: float, width: float) -
     return (height - width) * (np.sqrt(1.0 + np.sin(np.asarray(angle, float))) - 1.0)
 
 
-def bias_design(angle: Floats, height: float, width: float, powers: Sequence[int]) -> Floats:
+def bias_design(angle: Floats, height: float, width: float, basis: Callable[[Floats], Floats]) -> Floats:
     """Force [N] of a bias-extension test per unit of each coefficient of F_sh, shape [points, p] (Eq. 7, solved for F).
 
-    With ``F_sh = sum a_k gamma^k`` the energy balance of the test (Eq. 5) reads ::
+    With ``F_sh = sum_k a_k b_k(gamma)`` the energy balance of the test (Eq. 5) reads ::
 
-        F (H/W - 1)(cos g/2 - sin g/2) = sum_k a_k g^k [ (2H - 3W) cos g + W cos(g/2) / 2^k ]
+        F (H/W - 1)(cos g/2 - sin g/2) = sum_k a_k [ (2H - 3W) cos(g) b_k(g) + W cos(g/2) b_k(g/2) ]
 
-    which is linear in ``a_k``. Errors of measurement are in F, so this is the form to put into least squares; multiplied by
-    the known factors it is Eq. 7 with ``x z / 2^k`` added inside the bracket and ``z = W cos(g / 2)``.
+    which is linear in ``a_k``. Errors of measurement are in F, so this is the form to put into least squares. For powers
+    ``b_k(g) = g^k`` it is Eq. 7 multiplied by known factors, with ``x z / 2^k`` added in its bracket and ``z = W cos(g/2)``.
+
+    Parameters
+    ----------
+    angle
+        Shear angles of zone B [rad], shape [points].
+    height, width
+        Specimen [mm].
+    basis
+        Values of the functions ``b_k``, shape [points, p], at angles [rad].
     """
-    g = np.asarray(angle, float)[:, None]
-    k = np.asarray(powers, float)[None, :]
-    torque = (2.0 * height - 3.0 * width) * np.cos(g) + width * np.cos(0.5 * g) / 2.0**k
-    lever = (height / width - 1.0) * (np.cos(0.5 * g) - np.sin(0.5 * g))
-    return np.asarray(g**k * torque / lever)
+    g = np.asarray(angle, float)
+    half = 0.5 * g
+    pure = (2.0 * height - 3.0 * width) * np.cos(g)
+    lever = (height / width - 1.0) * (np.cos(half) - np.sin(half))
+    torque = pure[:, None] * basis(g) + (width * np.cos(half))[:, None] * basis(half)
+    return np.asarray(torque / lever[:, None])
 
 
 def bias_force(angle: Floats, coefficients: Sequence[float], height: float, width: float) -> Floats:
     """Force [N] of the test for F_sh = sum_k coefficients[k-1] gamma^k [N/mm] at shear angles of zone B [rad]."""
-    powers = range(1, len(coefficients) + 1)
-    return np.asarray(bias_design(np.asarray(angle, float), height, width, list(powers)) @ np.asarray(coefficients))
+    powers = np.arange(1, len(coefficients) + 1)
+    design = bias_design(np.atleast_1d(angle), height, width, lambda g: g[:, None] ** powers)
+    return np.asarray(design @ np.asarray(coefficients, float)).reshape(np.shape(angle))
 
 
 def frame_angle(displacement: Floats | float, frame_side: float) -> Floats:
