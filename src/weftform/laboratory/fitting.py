@@ -140,7 +140,10 @@ class PolynomialFit:
         critical = self._critical[key]
         centre = basis @ self.coefficients
         return Band(
-            np.minimum(free - critical * error, centre), centre, np.maximum(free + critical * error, centre), critical
+            np.minimum(free - critical * error, centre),
+            centre,
+            np.maximum(free + critical * error, centre),
+            critical,
         )
 
     def _simultaneous(self, basis: Floats, level: float) -> float:
@@ -148,7 +151,9 @@ class PolynomialFit:
         if self.specimens > 1:
             n = self.specimens
             curves = self.deviations @ basis.T / np.sqrt(n - 1)  # [n, m], covariance of one specimen
-            used = np.linalg.norm(curves, axis=0) > 1e-12 * max(float(np.linalg.norm(curves, axis=0).max()), 1e-300)
+            used = np.linalg.norm(curves, axis=0) > 1e-12 * max(
+                float(np.linalg.norm(curves, axis=0).max()), 1e-300
+            )
             if not used.any():
                 return _student(level, self.freedom)
             draws = rng.standard_normal((SIMULATIONS, n, n)) @ curves[:, used]
@@ -330,7 +335,9 @@ def _bounded(a: Floats, y: Floats, g: Floats, h: Floats) -> Floats:
     norm = np.maximum(np.linalg.norm(sides, axis=1), 1e-300)
     sides, room = sides / norm[:, None], room / norm
     size = float(np.abs(room).max()) or 1.0
-    u, _ = nnls(np.vstack([sides.T, room[None, :] / size]), np.append(np.zeros(len(middle)), 1.0), maxiter=3000)
+    u, _ = nnls(
+        np.vstack([sides.T, room[None, :] / size]), np.append(np.zeros(len(middle)), 1.0), maxiter=3000
+    )
     rest = np.append(sides.T @ u, room @ u / size - 1.0)
     if abs(rest[-1]) < 1e-14:
         raise MeasurementError(

@@ -22,7 +22,9 @@ def check_bias_specimen(height: float, width: float) -> None:
         A size is not positive, or the height is less than twice the width (Sec. 2.3.1).
     """
     if not (np.isfinite(height) and np.isfinite(width) and height > 0 and width > 0):
-        raise MeasurementError("specimen sizes must be positive", expected="mm > 0", got=f"{height:g} x {width:g}")
+        raise MeasurementError(
+            "specimen sizes must be positive", expected="mm > 0", got=f"{height:g} x {width:g}"
+        )
     if height < 2.0 * width:
         raise MeasurementError(
             "the specimen is too short for a bias-extension test: its centre is not in pure shear",
@@ -34,7 +36,7 @@ def check_bias_specimen(height: float, width: float) -> None:
 
 def kinematic_limit(height: float, width: float) -> float:
     """Displacement [mm] at which yarns that do not stretch or slip would lie parallel: (sqrt 2 - 1)(H - W)."""
-    return (np.sqrt(2.0) - 1.0) * (height - width)
+    return float(np.sqrt(2.0) - 1.0) * (height - width)
 
 
 def kinematic_angle(displacement: Floats | float, height: float, width: float) -> Floats:
@@ -49,7 +51,7 @@ def kinematic_angle(displacement: Floats | float, height: float, width: float) -
 
 def kinematic_displacement(angle: Floats | float, height: float, width: float) -> Floats:
     """Displacement [mm] at a kinematic shear angle [rad]; the inverse of :func:`kinematic_angle`."""
-    return (height - width) * (np.sqrt(1.0 + np.sin(np.asarray(angle, float))) - 1.0)
+    return np.asarray((height - width) * (np.sqrt(1.0 + np.sin(np.asarray(angle, float))) - 1.0))
 
 
 def bias_design(angle: Floats, height: float, width: float, basis: Callable[[Floats], Floats]) -> Floats:
@@ -92,12 +94,12 @@ def frame_angle(displacement: Floats | float, frame_side: float) -> Floats:
     ``cos(pi/4 - gamma/2) = 1/sqrt 2 + d / (2 L)``; 90 degrees beyond the end of the travel.
     """
     cosine = np.sqrt(0.5) + np.asarray(displacement, float) / (2.0 * frame_side)
-    return 0.5 * np.pi - 2.0 * np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.asarray(0.5 * np.pi - 2.0 * np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def frame_limit(frame_side: float) -> float:
     """Displacement [mm] at which a picture frame is closed."""
-    return (2.0 - np.sqrt(2.0)) * frame_side
+    return float(2.0 - np.sqrt(2.0)) * frame_side
 
 
 def frame_lever(angle: Floats, frame_side: float, fabric_side: float) -> Floats:
@@ -106,4 +108,6 @@ def frame_lever(angle: Floats, frame_side: float, fabric_side: float) -> Floats:
     ``F = 2 cos(pi/4 - gamma/2) F_sh L_fabric^2 / L_frame``: the normalisation of Cao et al. (2008), and the energy balance
     ``F dd = C_s L_fabric^2 dgamma`` with ``C_s = F_sh cos(gamma)``.
     """
-    return np.asarray(2.0 * np.cos(0.25 * np.pi - 0.5 * np.asarray(angle, float)) * fabric_side**2 / frame_side)
+    return np.asarray(
+        2.0 * np.cos(0.25 * np.pi - 0.5 * np.asarray(angle, float)) * fabric_side**2 / frame_side
+    )

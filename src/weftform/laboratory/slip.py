@@ -122,7 +122,9 @@ class _OnsetFit:
     terms: int
 
 
-def _best_onset(d: Floats, lag: Floats, kinematic: Floats, tried: Floats, shape: tuple[str, ...]) -> _OnsetFit:
+def _best_onset(
+    d: Floats, lag: Floats, kinematic: Floats, tried: Floats, shape: tuple[str, ...]
+) -> _OnsetFit:
     squares, departures = np.empty(len(tried)), np.empty(len(tried))
     rate = np.gradient(kinematic, d, edge_order=1) if np.all(np.diff(d) > 0) else np.ones(len(d))
     for k, onset in enumerate(tried):

@@ -120,13 +120,16 @@ def read_specimens(
         )
         if table.sha256 in seen:
             raise MeasurementError(
-                f"the same measurements as {seen[table.sha256]}: a specimen cannot count twice", file=table.file
+                f"the same measurements as {seen[table.sha256]}: a specimen cannot count twice",
+                file=table.file,
             )
         seen[table.sha256] = table.file
         specimens += _of_table(table, x, y, reading)
     if not specimens:
         raise MeasurementError(
-            "none of the specimens asked for is in the files", got=", ".join(reading.only), hint="check the spelling"
+            "none of the specimens asked for is in the files",
+            got=", ".join(reading.only),
+            hint="check the spelling",
         )
     _check_alike(specimens)
     return tuple(specimens)
@@ -194,11 +197,16 @@ def clean(
         )
     if not np.ptp(s.y) > 0.0:
         raise MeasurementError(
-            f"{s.name}: {y_name} never changes", file=s.file, line=int(s.lines[0]), got=f"{s.y[0]:g} throughout"
+            f"{s.name}: {y_name} never changes",
+            file=s.file,
+            line=int(s.lines[0]),
+            got=f"{s.y[0]:g} throughout",
         )
     started = []
     if s.x[0] > 0.05 * s.x[-1]:
-        started.append(f"{s.name}: starts at {x_name} = {s.x[0]:.4g}; the origin is taken as the undeformed state")
+        started.append(
+            f"{s.name}: starts at {x_name} = {s.x[0]:.4g}; the origin is taken as the undeformed state"
+        )
     if abs(s.y[0]) > 0.05 * np.abs(s.y).max() and s.x[0] < 0.02 * s.x[-1]:
         started.append(
             f"{s.name}: starts with {y_name} = {s.y[0]:.4g}, {100 * s.y[0] / np.abs(s.y).max():.0f} % of its largest; "
@@ -230,7 +238,7 @@ def _refuse_swapped(s: Specimen, x_name: str, y_name: str) -> None:
 
 
 def _upright(s: Specimen, x_name: str, y_name: str) -> Specimen:
-    turned = []
+    turned: list[str] = []
     x, y = s.x, s.y
     if x[np.argmax(np.abs(x - x[0]))] < x[0] and np.median(x) < 0.0:
         x, turned = -x, [*turned, x_name]
@@ -246,12 +254,17 @@ def _rising(s: Specimen, x_name: str) -> Specimen:
     travel = float(np.ptp(s.x))
     if travel == 0.0:
         raise MeasurementError(
-            f"{s.name}: {x_name} never changes", file=s.file, line=int(s.lines[0]), got=f"{s.x[0]:g} throughout"
+            f"{s.name}: {x_name} never changes",
+            file=s.file,
+            line=int(s.lines[0]),
+            got=f"{s.x[0]:g} throughout",
         )
     top = int(np.argmax(s.x))
     if top < len(s.x) - 1 and s.x[top] - s.x[-1] > SMALL_REVERSAL * travel:
         line = int(s.lines[top])
-        s = s.part(np.arange(top + 1), f"{s.name}: the return after line {line} ({s.x[top]:.4g}, the end) is cut off")
+        s = s.part(
+            np.arange(top + 1), f"{s.name}: the return after line {line} ({s.x[top]:.4g}, the end) is cut off"
+        )
         if len(s.x) < FEWEST_POINTS:
             raise MeasurementError(
                 f"{s.name}: {x_name} falls from the start", file=s.file, line=line, expected="a loading curve"

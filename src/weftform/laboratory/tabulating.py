@@ -64,13 +64,15 @@ def fit_table(
     everything = np.concatenate(list(xs))
     points = len(everything)
     if points < 4 or knots < 2:
-        raise MeasurementError("too few points for a table", expected="4 points and 2 knots at least", got=f"{points}")
+        raise MeasurementError(
+            "too few points for a table", expected="4 points and 2 knots at least", got=f"{points}"
+        )
     count = min(knots, points // 2)
     places = np.unique(np.append(np.quantile(everything, np.linspace(0.0, 1.0, count + 1)[1:-1]), valid_to))
     places = np.concatenate([[0.0], places[(places > 1e-6 * valid_to) & (places <= valid_to)]])
 
     def increments(x: Floats) -> Floats:
-        return np.clip((x[:, None] - places[:-1]) / np.diff(places), 0.0, 1.0)
+        return np.asarray(np.clip((x[:, None] - places[:-1]) / np.diff(places), 0.0, 1.0))
 
     a = np.vstack([design(x, increments) / np.sqrt(len(x)) for x in xs])
     y = np.concatenate([r / np.sqrt(len(r)) for r in responses])

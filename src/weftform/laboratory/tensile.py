@@ -61,7 +61,9 @@ class TensileCharacterisation:
         """Force of the specimen [N] of its elongation [mm]."""
         return self.fit.law()
 
-    def force_band(self, displacement: Floats, *, level: float = 0.95, simultaneous: bool = True) -> Band | None:
+    def force_band(
+        self, displacement: Floats, *, level: float = 0.95, simultaneous: bool = True
+    ) -> Band | None:
         """Confidence band of the force [N] at elongations [mm], shape [m]; None for a tabulated law."""
         if isinstance(self.fit, TableFit):
             return None
@@ -144,7 +146,9 @@ def characterise_tensile(
     ('warp', 5)
     """
     if not (length > 0.0 and width > 0.0 and np.isfinite(length * width)):
-        raise MeasurementError("specimen sizes must be positive", expected="mm > 0", got=f"{length:g} x {width:g}")
+        raise MeasurementError(
+            "specimen sizes must be positive", expected="mm > 0", got=f"{length:g} x {width:g}"
+        )
     if law == "polynomial" and not 1 <= degree <= 12:
         raise MeasurementError("no such degree", expected="1 to 12", got=str(degree))
     specimens = read_specimens(files, Quantity.DISPLACEMENT, Quantity.FORCE, reading)
@@ -164,7 +168,9 @@ def characterise_tensile(
     stages = tensile_stages(mean.x, mean.mean, noise)
     start, end = interval if interval is not None else (0.0, stages.linear_end)
     if not 0.0 <= start < end:
-        raise MeasurementError("the interval is empty", expected="0 <= start < end", got=f"{start:g} to {end:g} mm")
+        raise MeasurementError(
+            "the interval is empty", expected="0 <= start < end", got=f"{start:g} to {end:g} mm"
+        )
     short = [s.name for s in specimens if s.x[-1] < 0.999 * end]
     if short:
         warnings.append(f"{', '.join(short)}: ends before {end:.4g} mm, the end of the interval")
@@ -172,11 +178,15 @@ def characterise_tensile(
     used = [s for s in used if len(s.x) > 1]
     if not used:
         raise MeasurementError(
-            "no points in the interval", expected=f"displacements in {start:g} to {end:g} mm", got=f"up to {mean.x[-1]:.4g} mm"
+            "no points in the interval",
+            expected=f"displacements in {start:g} to {end:g} mm",
+            got=f"up to {mean.x[-1]:.4g} mm",
         )
     reached = max(float(s.x[-1]) for s in used)
     if end > 1.001 * reached:
-        warnings.append(f"the interval asked for ends at {end:.4g} mm, the measurements at {reached:.4g} mm; validity ends there")
+        warnings.append(
+            f"the interval asked for ends at {end:.4g} mm, the measurements at {reached:.4g} mm; validity ends there"
+        )
         end = reached
     fit: PolynomialFit | TableFit
     if law == "tabulated":
@@ -193,7 +203,15 @@ def characterise_tensile(
         )
         warnings += fit_warnings(fit, "mm", "N")
     return TensileCharacterisation(
-        direction, float(length), float(width), specimens, mean, stages, (float(start), float(end)), fit, tuple(warnings)
+        direction,
+        float(length),
+        float(width),
+        specimens,
+        mean,
+        stages,
+        (float(start), float(end)),
+        fit,
+        tuple(warnings),
     )
 
 
@@ -212,7 +230,11 @@ def fit_warnings(fit: PolynomialFit, x_unit: str, y_unit: str, x_factor: float =
             "a card with it is refused"
         )
     if fit.constant != 0.0:
-        warnings.append(f"the fit does not pass the origin ({fit.constant:.4g} {y_unit}); a card with it is refused")
+        warnings.append(
+            f"the fit does not pass the origin ({fit.constant:.4g} {y_unit}); a card with it is refused"
+        )
     if fit.specimens == 1:
-        warnings.append("one specimen only: the band tells the noise of its curve, not the scatter of the fabric")
+        warnings.append(
+            "one specimen only: the band tells the noise of its curve, not the scatter of the fabric"
+        )
     return warnings

@@ -1,0 +1,354 @@
+"""Bias-extension test: from specimens to the shear law (Secs. 2.3, 2.4.2, 2.4.3; Eqs. 1, 2, 5 to 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from weftform.errors import MeasurementError
+from weftform.fabric.laws import Floats
+from weftform.laboratory.averaging import MeanCurve, average
+from weftform.laboratory.fitting import PolynomialFit, Weighting, fit_polynomial, power_basis
+from weftform.laboratory.kinematics import (
+    bias_design,
+    check_bias_specimen,
+    kinematic_angle,
+    kinematic_displacement,
+    kinematic_limit,
+)
+from weftform.laboratory.markers import MarkerTracking
+from weftform.laboratory.presets import Quantity
+from weftform.laboratory.shear import ShearCurve
+from weftform.laboratory.slip import SlipOnset, slip_onset
+from weftform.laboratory.specimen import Reading, Specimen, read_specimens
+from weftform.laboratory.stages import LockingCriterion, shear_stages
+from weftform.laboratory.tabulating import TableFit, fit_table
+from weftform.laboratory.tensile import LawKind, fit_warnings
+
+AngleSource = Literal["auto", "kinematic", "measured"]
+LARGEST_KINEMATIC_DEG = 60.0
+"""Kinematic angle beyond which nothing is fitted unless asked for: yarns slip or the cloth folds long before."""
+
+
+@dataclass(frozen=True, eq=False)
+class BiasExtensionCharacterisation:
+    """What the bias-extension tests say.
+
+    Attributes
+    ----------
+    height, width
+        Free height between the clamps and width of the specimens [mm].
+    specimens, mean
+        The curves of force [N] against displacement [mm], and their mean with its scatter.
+    tracking
+        Marker measurements, if any.
+    measured
+        Displacements [mm] and measured angles of zone B [deg], two arrays of one shape; None without measurement.
+    slip
+        Onset of slip; None without measured angles.
+    angle_source
+        ``kinematic`` or ``measured``: the angle of the law.
+    interval_deg
+        Shear angles used for the law.
+    shear
+        The law with tau, G12, stages and bands.
+    warnings
+        What was done to the measurements and the fit.
+    """
+
+    height: float
+    width: float
+    specimens: tuple[Specimen, ...]
+    mean: MeanCurve
+    tracking: tuple[MarkerTracking, ...]
+    measured: tuple[Floats, Floats] | None
+    slip: SlipOnset | None
+    angle_source: Literal["kinematic", "measured"]
+    interval_deg: tuple[float, float]
+    shear: ShearCurve
+    warnings: tuple[str, ...]
+
+    def force(self, angle: Floats) -> Floats:
+        """Force of the test [N] that the law gives at shear angles of zone B [rad] (Eq. 5)."""
+        law = self.shear.law
+        return bias_design(
+            np.asarray(angle, float), self.height, self.width, lambda g: law.value(g)[:, None]
+        )[:, 0]
+
+    def card_table(self) -> dict[str, Any]:
+        """The table ``shear`` of a fabric card."""
+        n = len(self.specimens)
+        return self.shear.card_table(
+            f"Bias-extension tests of {n} specimen{'s' if n > 1 else ''} {self.height:g} x {self.width:g} mm, "
+            f"{self.angle_source} angle, Eq. 5; see provenance"
+        )
+
+
+def characterise_bias_extension(
+    files: Sequence[Path | str],
+    *,
+    height: float,
+    width: float,
+    thickness: float,
+    tracking: Sequence[MarkerTracking] = (),
+    angle: AngleSource = "auto",
+    law: LawKind = "polynomial",
+    degree: int = 5,
+    interval_deg: tuple[float, float] | None = None,
+    monotone: bool = True,
+    weighting: Weighting = "uniform",
+    knots: int = 24,
+    locking: LockingCriterion = LockingCriterion.BROKEN_LINE,
+    reading: Reading = Reading(),  # noqa: B008 (frozen)
+) -> BiasExtensionCharacterisation:
+    """From the files of the machine, and of the cameras where there are some, to a shear law.
+
+    Parameters
+    ----------
+    files
+        Force against displacement, one or several specimens each; a column ``shear_angle_deg`` counts as measured angle.
+    height, width
+        Of the specimens [mm]; the height is the free length between the clamps.
+    thickness
+        Of the fabric [mm].
+    tracking
+        Marker measurements; the mean of zone B is the measured angle.
+    angle
+        ``kinematic`` (Eqs. 1-2), ``measured``, or ``auto``: measured where slip is found, kinematic otherwise.
+    law, degree, knots
+        Polynomial of that degree (Eq. 8 has 5), or a table.
+    interval_deg
+        Shear angles on which the law is fitted. By default from zero to the peak of the force; with the kinematic angle
+        no further than the onset of slip, nor than 60 degrees.
+    monotone
+        Impose a rising F_sh, that is G12 >= 0.
+    weighting
+        Errors of one size, or in proportion to the force.
+    locking
+        Criterion of the locking angle.
+
+    Raises
+    ------
+    MeasurementError
+        Height / width < 2, a file or curve cannot be used, ``measured`` without measured angles, or no fit.
+
+    Examples
+    --------
+    >>> from weftform.laboratory import characterise_bias_extension, sample
+    >>> found = characterise_bias_extension(sample("bias-extension"), height=150, width=50, thickness=0.62)
+    >>> found.shear.modulus_positive
+    True
+    """
+    check_bias_specimen(height, width)
+    if not (np.isfinite(thickness) and thickness > 0.0):
+        raise MeasurementError("the thickness must be positive", expected="mm > 0", got=f"{thickness:g}")
+    if law == "polynomial" and not 1 <= degree <= 12:
+        raise MeasurementError("no such degree", expected="1 to 12", got=str(degree))
+    specimens = read_specimens(files, Quantity.DISPLACEMENT, Quantity.FORCE, reading, angle=True)
+    warnings = [w for s in specimens for w in s.warnings] + [w for t in tracking for w in t.warnings]
+    _check_travel(specimens, height, width)
+    mean = average(specimens)
+    measured = _measured(specimens, tracking)
+    slip = None
+    if measured is not None:
+        slip = slip_onset(*measured, np.degrees(kinematic_angle(measured[0], height, width)))
+    source: Literal["kinematic", "measured"]
+    if angle == "auto":
+        source = "measured" if slip is not None and slip.found else "kinematic"
+    else:
+        source = angle
+    if source == "measured" and measured is None:
+        raise MeasurementError(
+            "no measured angle",
+            expected="marker files, or a column shear_angle_deg",
+            hint="use the kinematic angle",
+        )
+    limit = kinematic_limit(height, width)
+    if source == "kinematic":
+        beyond = [s.name for s in specimens if s.x[-1] >= limit]
+        if beyond:
+            warnings.append(
+                f"{', '.join(beyond)}: displacements beyond {limit:.4g} mm, where yarns without slip would be parallel, have no "
+                "kinematic angle and are left out"
+            )
+    shown = [_angles(s, source, measured, height, width) for s in specimens]
+    start, end = interval_deg or (
+        0.0,
+        _end_of_interval(mean, source, measured, slip, height, width, warnings),
+    )
+    if not 0.0 <= start < end < 90.0:
+        raise MeasurementError(
+            "the interval is empty or too wide",
+            expected="0 <= start < end < 90 deg",
+            got=f"{start:g}-{end:g}",
+        )
+    xs, ys = [], []
+    for s, g in zip(specimens, shown, strict=True):
+        used = np.isfinite(g) & (g >= np.radians(start)) & (g <= np.radians(end) * (1.0 + 1e-12))
+        if used.sum() > 1:
+            xs.append(g[used])
+            ys.append(s.y[used])
+    if not xs:
+        raise MeasurementError(
+            "no points in the interval", expected=f"shear angles in {start:.4g}-{end:.4g} deg"
+        )
+    reached = max(float(g.max()) for g in xs)
+    if np.degrees(reached) < end:
+        if interval_deg is not None and np.degrees(reached) < 0.98 * end:
+            warnings.append(
+                f"the interval asked for ends at {end:.4g} deg, the measurements at {np.degrees(reached):.4g}"
+            )
+        end = float(np.degrees(reached))
+    fit = _fit(xs, ys, height, width, reached, law, degree, monotone, weighting, knots)
+    if isinstance(fit, PolynomialFit):
+        warnings += fit_warnings(fit, "deg", "N", 180.0 / np.pi)
+    stages = shear_stages(fit.law(), fit.valid_to, criterion=locking)
+    shear = ShearCurve(fit, float(thickness), stages)
+    if not shear.modulus_positive:
+        warnings.append("G12 is negative somewhere in the validity")
+    return BiasExtensionCharacterisation(
+        height=float(height),
+        width=float(width),
+        specimens=specimens,
+        mean=mean,
+        tracking=tuple(tracking),
+        measured=measured,
+        slip=slip,
+        angle_source=source,
+        interval_deg=(float(start), float(end)),
+        shear=shear,
+        warnings=tuple(warnings),
+    )
+
+
+def _fit(
+    xs: list[Floats],
+    ys: list[Floats],
+    height: float,
+    width: float,
+    end: float,
+    law: LawKind,
+    degree: int,
+    monotone: bool,
+    weighting: Weighting,
+    knots: int,
+) -> PolynomialFit | TableFit:
+    def design(g: Floats, basis: Callable[[Floats], Floats]) -> Floats:
+        return bias_design(g, height, width, basis)
+
+    if law == "tabulated":
+        return fit_table(xs, ys, design, end, knots=knots)
+    powers = list(range(1, degree + 1))
+    designs = [design(g, lambda v: power_basis(v, powers)) for g in xs]
+    return fit_polynomial(designs, ys, powers, end, monotone=monotone, weighting=weighting)
+
+
+def _check_travel(specimens: Sequence[Specimen], height: float, width: float) -> None:
+    """A bias specimen cannot be pulled to twice the length at which its yarns are parallel."""
+    most = 2.0 * kinematic_limit(height, width)
+    for s in specimens:
+        if s.x[-1] > most:
+            raise MeasurementError(
+                f"{s.name}: a displacement of {s.x[-1]:.4g} mm is not one of a bias-extension test of {height:g} x {width:g} mm",
+                file=s.file,
+                line=int(s.lines[np.argmax(s.x > most)]),
+                expected=f"at most {most:.4g} mm (yarns are parallel at {most / 2:.4g} mm)",
+                got=f"{s.x[-1]:.6g} mm",
+                hint="are displacement and force swapped, or the units wrong?",
+            )
+
+
+def _measured(
+    specimens: Sequence[Specimen], tracking: Sequence[MarkerTracking]
+) -> tuple[Floats, Floats] | None:
+    """All measured angles of zone B: marker trackings, else the angle column of the specimens."""
+    d: list[Floats] = []
+    g: list[Floats] = []
+    for t in tracking:
+        d.append(t.displacement)
+        g.append(t.zone("B").mean)
+    if not tracking:
+        for s in specimens:
+            if s.angle is not None:
+                d.append(s.x)
+                g.append(s.angle)
+    if not d:
+        return None
+    displacement, angle = np.concatenate(d), np.concatenate(g)
+    ok = np.isfinite(angle)
+    order = np.argsort(displacement[ok], kind="stable")
+    return displacement[ok][order], angle[ok][order]
+
+
+def _angles(
+    s: Specimen, source: str, measured: tuple[Floats, Floats] | None, height: float, width: float
+) -> Floats:
+    """Shear angle [rad] of each point of a specimen; NaN where there is none."""
+    if source == "kinematic":
+        return np.where(s.x < kinematic_limit(height, width), kinematic_angle(s.x, height, width), np.nan)
+    if s.angle is not None and np.isfinite(s.angle).sum() > 1:
+        ok = np.isfinite(s.angle)
+        own_d, own_g = s.x[ok], s.angle[ok]
+    else:
+        assert measured is not None
+        own_d, inverse = np.unique(measured[0], return_inverse=True)
+        own_g = np.bincount(inverse, weights=measured[1]) / np.bincount(inverse)
+    smooth = _smoothed(own_d, own_g, s.x, height, width)
+    return np.where((s.x <= own_d[-1]) & (smooth > 0.0), np.radians(smooth), np.nan)
+
+
+def _smoothed(d: Floats, angle_deg: Floats, at: Floats, height: float, width: float) -> Floats:
+    """Measured angle without its noise: a cubic smoothing spline of what it differs from the kinematic angle by.
+
+    Angles enter Eq. 5 with high powers, so noise in them would bias the law and not only scatter it.
+    """
+    from scipy.interpolate import make_smoothing_spline
+
+    kinematic = np.degrees(kinematic_angle(d, height, width))
+    at_kinematic = np.degrees(kinematic_angle(at, height, width))
+    if len(d) < 8:
+        return np.asarray(at_kinematic + np.interp(at, d, angle_deg - kinematic))
+    spline = make_smoothing_spline(d, angle_deg - kinematic)
+    return np.asarray(at_kinematic + spline(np.clip(at, d[0], d[-1])))
+
+
+def _end_of_interval(
+    mean: MeanCurve,
+    source: str,
+    measured: tuple[Floats, Floats] | None,
+    slip: SlipOnset | None,
+    height: float,
+    width: float,
+    warnings: list[str],
+) -> float:
+    """Shear angle [deg] to which the law is fitted by default."""
+    peak = int(np.argmax(mean.mean))
+    d = float(mean.x[peak])
+    if peak < len(mean.x) - 1:
+        warnings.append(f"the mean force falls beyond {d:.4g} mm; the law ends there")
+    if source == "measured":
+        assert measured is not None
+        unique, inverse = np.unique(measured[0], return_inverse=True)
+        angle = np.bincount(inverse, weights=measured[1]) / np.bincount(inverse)
+        grid = np.linspace(0.0, min(d, float(unique[-1])), 400)
+        return float(_smoothed(unique, angle, grid, height, width).max())
+    if slip is not None and slip.displacement is not None and slip.displacement < d:
+        d = slip.displacement
+        warnings.append(
+            f"yarns slip from {d:.4g} mm on ({slip.angle_deg:.3g} deg): the kinematic angle holds no further, the law ends there"
+        )
+    elif slip is None:
+        warnings.append(
+            "no measured angle, so slip cannot be seen: the kinematic angle is taken at its word to the end of the law"
+        )
+    widest = float(kinematic_displacement(np.radians(LARGEST_KINEMATIC_DEG), height, width))
+    if d > widest:
+        d = widest
+        warnings.append(
+            f"the law ends at {LARGEST_KINEMATIC_DEG:g} deg of kinematic shear ({d:.4g} mm); --to-deg moves it"
+        )
+    return float(np.degrees(kinematic_angle(d, height, width)))
