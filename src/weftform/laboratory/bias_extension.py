@@ -155,7 +155,8 @@ def characterise_bias_extension(
     measured = _measured(specimens, tracking)
     slip = None
     if measured is not None:
-        slip = slip_onset(*measured, np.degrees(kinematic_angle(measured[0], height, width)))
+        d, g = (v[measured[0] < kinematic_limit(height, width)] for v in measured)
+        slip = slip_onset(d, g, np.degrees(kinematic_angle(d, height, width)))
     source: Literal["kinematic", "measured"]
     if angle == "auto":
         source = "measured" if slip is not None and slip.found else "kinematic"

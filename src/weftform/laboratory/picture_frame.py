@@ -39,8 +39,8 @@ class PictureFrameCharacterisation:
         Between the hinges, and of the sheared cloth [mm].
     measured
         What the files held.
-    specimens
-        The curves as measured.
+    specimens, curves
+        The curves as measured, and normalised: F_sh [N/mm] against shear angle [deg].
     mean
         Mean of F_sh [N/mm] against shear angle [deg], with its scatter.
     interval_deg
@@ -55,6 +55,7 @@ class PictureFrameCharacterisation:
     fabric_side: float
     measured: Measured
     specimens: tuple[Specimen, ...]
+    curves: tuple[Specimen, ...]
     mean: MeanCurve
     interval_deg: tuple[float, float]
     shear: ShearCurve
@@ -178,6 +179,7 @@ def characterise_picture_frame(
         float(fabric_side),
         kind,
         specimens,
+        tuple(curves),
         mean,
         (float(start), float(end)),
         shear,

@@ -183,7 +183,9 @@ def characterise_tensile(
             got=f"up to {mean.x[-1]:.4g} mm",
         )
     reached = max(float(s.x[-1]) for s in used)
-    if end > 1.001 * reached:
+    if interval is None:
+        end = min(end, reached)
+    elif end > 1.001 * reached:
         warnings.append(
             f"the interval asked for ends at {end:.4g} mm, the measurements at {reached:.4g} mm; validity ends there"
         )
