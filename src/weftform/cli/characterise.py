@@ -157,7 +157,7 @@ def tensile(
             width=width,
             law=law.value,
             degree=degree,
-            interval=_interval(from_mm, to_mm, found_end=None),
+            interval=_interval(from_mm, to_mm),
             monotone=monotone,
             through_origin=origin,
             weighting=weighting.value,
@@ -180,7 +180,7 @@ def tensile(
         ):
             warnings.append(f"the {other} of the card is the same as the {yarns}, so it changes with it")
         _say_warnings(warnings)
-        tables = {("tension", yarns): found.card_table()}
+        tables: dict[tuple[str, ...], dict[str, Any]] = {("tension", yarns): found.card_table()}
         if direction is DirectionChoice.BOTH:
             tables[("tension", other)] = {"same_as": yarns}
         origin_table = provenance(
@@ -250,7 +250,7 @@ def bias_extension(
             angle=angle.value,
             law=law.value,
             degree=degree,
-            interval_deg=_interval(from_deg, to_deg, found_end=None),
+            interval_deg=_interval(from_deg, to_deg),
             monotone=monotone,
             weighting=weighting.value,
             knots=knots,
@@ -322,7 +322,7 @@ def picture_frame(
             thickness=_thickness(thickness, output, base),
             law=law.value,
             degree=degree,
-            interval_deg=_interval(from_deg, to_deg, found_end=None),
+            interval_deg=_interval(from_deg, to_deg),
             monotone=monotone,
             weighting=weighting.value,
             knots=knots,
@@ -381,9 +381,7 @@ def _reading(
     return Reading(preset, _pairs(column, "--column"), _pairs(unit, "--unit"), tuple(only or ()), zero)
 
 
-def _interval(
-    start: float | None, end: float | None, *, found_end: float | None
-) -> tuple[float, float] | None:
+def _interval(start: float | None, end: float | None) -> tuple[float, float] | None:
     if start is None and end is None:
         return None
     if end is None:

@@ -182,6 +182,14 @@ def clean(
         )
     if guess_swapped:
         _refuse_swapped(specimen, x_name, y_name)
+    if not np.ptp(specimen.y) > 0.0:
+        raise MeasurementError(
+            f"{specimen.name}: {y_name} never changes",
+            file=specimen.file,
+            line=int(specimen.lines[0]),
+            expected="a curve",
+            got=f"{specimen.y[0]:g} throughout",
+        )
     s = _upright(specimen, x_name, y_name)
     if zero:
         s = replace(s, x=s.x - s.x[0], y=s.y - s.y[0])
@@ -194,13 +202,6 @@ def clean(
             expected=f"{FEWEST_POINTS} rows at least",
             got=f"{len(s.x)}",
             hint="; ".join(s.warnings) or None,
-        )
-    if not np.ptp(s.y) > 0.0:
-        raise MeasurementError(
-            f"{s.name}: {y_name} never changes",
-            file=s.file,
-            line=int(s.lines[0]),
-            got=f"{s.y[0]:g} throughout",
         )
     started = []
     if s.x[0] > 0.05 * s.x[-1]:

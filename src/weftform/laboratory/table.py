@@ -262,7 +262,7 @@ def _columns(
                     if quantity in wanted
                     else f"a column such as {quantity.value}",
                     got=", ".join(names)[:300],
-                    hint=f'is "{close[0]}" meant? ' * bool(close)
+                    hint=(f'is "{close[0]}" meant? ' if close else "")
                     + f"Name the column: --column {split_unit(quantity.value)[0]}=HEADER",
                 )
             continue
@@ -347,8 +347,8 @@ def _body(
     unreadable: list[tuple[int, str, str]] = []
     for row in body:
         if numeric and not any(is_number(c) for c in row.cells):
-            again = sum(preset.quantity_of(split_unit(c)[0]) is not None for c in row.cells)
-            if again >= 2:
+            named = {preset.quantity_of(split_unit(c)[0]) for c in row.cells}
+            if len(named & {c.quantity for c in taken}) >= 2:
                 raise MeasurementError(
                     "a second header inside the table: are there several tables, perhaps in other units?",
                     file=path,

@@ -137,22 +137,20 @@ def _cells(line: str, delimiter: str) -> tuple[str, ...]:
 def _delimiter(lines: list[str]) -> str:
     sample = lines[-400:]
 
-    def score(delimiter: str) -> tuple[float, int]:
-        """Share of lines whose cells are mostly numbers and equally many; then the number of cells."""
-        counts: dict[int, int] = {}
+    def score(delimiter: str) -> float:
+        """Share of the lines with the commonest number of cells, each weighted by its share of numbers."""
+        counts: dict[int, float] = {}
         for line in sample:
             cells = _cells(line, delimiter)
             readable = sum(bool(_NUMBER.match(c)) or c.lower() in _MISSING for c in cells)
             if len(cells) > 1 and 2 * readable >= len(cells):
-                counts[len(cells)] = counts.get(len(cells), 0) + 1
-        if not counts:
-            return 0.0, 0
-        width, lines_of_width = max(counts.items(), key=lambda item: item[1])
-        return lines_of_width / len(sample), width
+                counts[len(cells)] = counts.get(len(cells), 0.0) + readable / len(cells)
+        return max(counts.values(), default=0.0) / len(sample)
 
     # The first of equals wins: a comma is tried after ; and tab because it may be a decimal mark.
-    best = max((*DELIMITERS, " "), key=lambda d: (round(score(d)[0], 2), -(*DELIMITERS, " ").index(d)))
-    return best if score(best)[0] > 0.0 else ","
+    candidates = (*DELIMITERS, " ")
+    best = max(candidates, key=lambda d: (round(score(d), 2), -candidates.index(d)))
+    return best if score(best) > 0.0 else ","
 
 
 def _decimal_comma(rows: tuple[CellRow, ...], delimiter: str) -> bool:
