@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests_laboratory import bias_curve, eq4
+from paper_equations import bias_curve, eq4
 from weftform.errors import MeasurementError
 from weftform.laboratory import Reading, characterise_bias_extension, characterise_tensile
 

@@ -21,6 +21,7 @@ from weftform.laboratory.kinematics import (
     kinematic_limit,
 )
 from weftform.laboratory.markers import MarkerTracking
+from weftform.laboratory.measured_angle import MeasuredAngle
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.shear import ShearCurve
 from weftform.laboratory.slip import SlipOnset, slip_onset
@@ -30,6 +31,8 @@ from weftform.laboratory.tabulating import TableFit, fit_table
 from weftform.laboratory.tensile import LawKind, fit_warnings
 
 AngleSource = Literal["auto", "kinematic", "measured"]
+ANGLE_DRAWS = 40
+"""Times that a measured angle is drawn again from its noise, to see what it does to the law."""
 LARGEST_KINEMATIC_DEG = 60.0
 """Kinematic angle beyond which nothing is fitted unless asked for: yarns slip or the cloth folds long before."""
 
@@ -50,6 +53,8 @@ class BiasExtensionCharacterisation:
         Displacements [mm] and measured angles of zone B [deg], two arrays of one shape; None without measurement.
     slip
         Onset of slip; None without measured angles.
+    angle_curve
+        The smooth measured angle that the law uses; None for the kinematic angle.
     angle_source
         ``kinematic`` or ``measured``: the angle of the law.
     interval_deg
@@ -67,6 +72,7 @@ class BiasExtensionCharacterisation:
     tracking: tuple[MarkerTracking, ...]
     measured: tuple[Floats, Floats] | None
     slip: SlipOnset | None
+    angle_curve: MeasuredAngle | None
     angle_source: Literal["kinematic", "measured"]
     interval_deg: tuple[float, float]
     shear: ShearCurve
@@ -168,31 +174,39 @@ def characterise_bias_extension(
             expected="marker files, or a column shear_angle_deg",
             hint="use the kinematic angle",
         )
+    curve = None
+    if source == "measured" and measured is not None and slip is not None:
+        curve = MeasuredAngle.of(*measured, height, width, slip)
     limit = kinematic_limit(height, width)
-    if source == "kinematic":
-        beyond = [s.name for s in specimens if s.x[-1] >= limit]
-        if beyond:
-            warnings.append(
-                f"{', '.join(beyond)}: displacements beyond {limit:.4g} mm, where yarns without slip would be parallel, have no "
-                "kinematic angle and are left out"
-            )
-    shown = [_angles(s, source, measured, height, width) for s in specimens]
-    start, end = interval_deg or (
-        0.0,
-        _end_of_interval(mean, source, measured, slip, height, width, warnings),
-    )
+    beyond = [s.name for s in specimens if s.x[-1] >= limit]
+    if curve is None and beyond:
+        warnings.append(
+            f"{', '.join(beyond)}: displacements beyond {limit:.4g} mm, where yarns without slip would be parallel, have no "
+            "kinematic angle and are left out"
+        )
+    start, end = interval_deg or (0.0, _end_of_interval(mean, curve, slip, height, width, warnings))
     if not 0.0 <= start < end < 90.0:
         raise MeasurementError(
             "the interval is empty or too wide",
             expected="0 <= start < end < 90 deg",
             got=f"{start:g}-{end:g}",
         )
-    xs, ys = [], []
-    for s, g in zip(specimens, shown, strict=True):
-        used = np.isfinite(g) & (g >= np.radians(start)) & (g <= np.radians(end) * (1.0 + 1e-12))
-        if used.sum() > 1:
-            xs.append(g[used])
-            ys.append(s.y[used])
+
+    def angles(s: Specimen) -> Floats:
+        if curve is not None:
+            return curve.at(s.x)
+        return np.where(s.x < limit, kinematic_angle(s.x, height, width), np.nan)
+
+    used: list[np.ndarray] = []
+    xs: list[Floats] = []
+    ys: list[Floats] = []
+    for s in specimens:
+        g = angles(s)
+        ok = np.isfinite(g) & (g >= np.radians(start)) & (g <= np.radians(end) * (1.0 + 1e-12))
+        if ok.sum() > 1:
+            used.append(s.x[ok])
+            xs.append(g[ok])
+            ys.append(s.y[ok])
     if not xs:
         raise MeasurementError(
             "no points in the interval", expected=f"shear angles in {start:.4g}-{end:.4g} deg"
@@ -204,7 +218,13 @@ def characterise_bias_extension(
                 f"the interval asked for ends at {end:.4g} deg, the measurements at {np.degrees(reached):.4g}"
             )
         end = float(np.degrees(reached))
-    fit = _fit(xs, ys, height, width, reached, law, degree, monotone, weighting, knots)
+    again: list[list[Floats]] = []
+    if curve is not None and law == "polynomial":
+        rng = np.random.default_rng(0)
+        for _ in range(ANGLE_DRAWS):
+            drawn = curve.drawn_again(rng)
+            again.append([np.nan_to_num(drawn.at(d)) for d in used])
+    fit = _fit(xs, ys, again, height, width, reached, law, degree, monotone, weighting, knots)
     if isinstance(fit, PolynomialFit):
         warnings += fit_warnings(fit, "deg", "N", 180.0 / np.pi)
     stages = shear_stages(fit.law(), fit.valid_to, criterion=locking)
@@ -219,6 +239,7 @@ def characterise_bias_extension(
         tracking=tuple(tracking),
         measured=measured,
         slip=slip,
+        angle_curve=curve,
         angle_source=source,
         interval_deg=(float(start), float(end)),
         shear=shear,
@@ -229,6 +250,7 @@ def characterise_bias_extension(
 def _fit(
     xs: list[Floats],
     ys: list[Floats],
+    again: list[list[Floats]],
     height: float,
     width: float,
     end: float,
@@ -244,8 +266,19 @@ def _fit(
     if law == "tabulated":
         return fit_table(xs, ys, design, end, knots=knots)
     powers = list(range(1, degree + 1))
-    designs = [design(g, lambda v: power_basis(v, powers)) for g in xs]
-    return fit_polynomial(designs, ys, powers, end, monotone=monotone, weighting=weighting)
+
+    def powers_of(angles: list[Floats]) -> list[Floats]:
+        return [design(g, lambda v: power_basis(v, powers)) for g in angles]
+
+    return fit_polynomial(
+        powers_of(xs),
+        ys,
+        powers,
+        end,
+        monotone=monotone,
+        weighting=weighting,
+        designs_again=[powers_of(angles) for angles in again],
+    )
 
 
 def _check_travel(specimens: Sequence[Specimen], height: float, width: float) -> None:
@@ -267,80 +300,41 @@ def _measured(
     specimens: Sequence[Specimen], tracking: Sequence[MarkerTracking]
 ) -> tuple[Floats, Floats] | None:
     """All measured angles of zone B: marker trackings, else the angle column of the specimens."""
-    d: list[Floats] = []
-    g: list[Floats] = []
-    for t in tracking:
-        d.append(t.displacement)
-        g.append(t.zone("B").mean)
-    if not tracking:
-        for s in specimens:
-            if s.angle is not None:
-                d.append(s.x)
-                g.append(s.angle)
-    if not d:
+    pairs = [(t.displacement, t.zone("B").mean) for t in tracking]
+    if not pairs:
+        pairs = [(s.x, s.angle) for s in specimens if s.angle is not None]
+    if not pairs:
         return None
-    displacement, angle = np.concatenate(d), np.concatenate(g)
+    displacement, angle = (np.concatenate(part) for part in zip(*pairs, strict=True))
     ok = np.isfinite(angle)
+    if ok.sum() < 2:
+        return None
     order = np.argsort(displacement[ok], kind="stable")
     return displacement[ok][order], angle[ok][order]
 
 
-def _angles(
-    s: Specimen, source: str, measured: tuple[Floats, Floats] | None, height: float, width: float
-) -> Floats:
-    """Shear angle [rad] of each point of a specimen; NaN where there is none."""
-    if source == "kinematic":
-        return np.where(s.x < kinematic_limit(height, width), kinematic_angle(s.x, height, width), np.nan)
-    if s.angle is not None and np.isfinite(s.angle).sum() > 1:
-        ok = np.isfinite(s.angle)
-        own_d, own_g = s.x[ok], s.angle[ok]
-    else:
-        assert measured is not None
-        own_d, inverse = np.unique(measured[0], return_inverse=True)
-        own_g = np.bincount(inverse, weights=measured[1]) / np.bincount(inverse)
-    smooth = _smoothed(own_d, own_g, s.x, height, width)
-    return np.where((s.x <= own_d[-1]) & (smooth > 0.0), np.radians(smooth), np.nan)
-
-
-def _smoothed(d: Floats, angle_deg: Floats, at: Floats, height: float, width: float) -> Floats:
-    """Measured angle without its noise: a cubic smoothing spline of what it differs from the kinematic angle by.
-
-    Angles enter Eq. 5 with high powers, so noise in them would bias the law and not only scatter it.
-    """
-    from scipy.interpolate import make_smoothing_spline
-
-    kinematic = np.degrees(kinematic_angle(d, height, width))
-    at_kinematic = np.degrees(kinematic_angle(at, height, width))
-    if len(d) < 8:
-        return np.asarray(at_kinematic + np.interp(at, d, angle_deg - kinematic))
-    spline = make_smoothing_spline(d, angle_deg - kinematic)
-    return np.asarray(at_kinematic + spline(np.clip(at, d[0], d[-1])))
-
-
 def _end_of_interval(
     mean: MeanCurve,
-    source: str,
-    measured: tuple[Floats, Floats] | None,
+    curve: MeasuredAngle | None,
     slip: SlipOnset | None,
     height: float,
     width: float,
     warnings: list[str],
 ) -> float:
-    """Shear angle [deg] to which the law is fitted by default."""
+    """Shear angle [deg] to which the law is fitted by default; ``curve`` is None for the kinematic angle."""
     peak = int(np.argmax(mean.mean))
     d = float(mean.x[peak])
     if peak < len(mean.x) - 1:
         warnings.append(f"the mean force falls beyond {d:.4g} mm; the law ends there")
-    if source == "measured":
-        assert measured is not None
-        unique, inverse = np.unique(measured[0], return_inverse=True)
-        angle = np.bincount(inverse, weights=measured[1]) / np.bincount(inverse)
-        grid = np.linspace(0.0, min(d, float(unique[-1])), 400)
-        return float(_smoothed(unique, angle, grid, height, width).max())
+    if curve is not None:
+        return float(
+            np.degrees(np.nanmax(curve.at(np.linspace(0.0, min(d, float(curve.displacement[-1])), 400))))
+        )
     if slip is not None and slip.displacement is not None and slip.displacement < d:
         d = slip.displacement
         warnings.append(
-            f"yarns slip from {d:.4g} mm on ({slip.angle_deg:.3g} deg): the kinematic angle holds no further, the law ends there"
+            f"yarns slip from {d:.4g} mm on ({slip.angle_deg:.3g} deg): the kinematic angle holds no further, the law ends "
+            "there"
         )
     elif slip is None:
         warnings.append(

@@ -108,6 +108,9 @@ def _angles(found: BiasExtensionCharacterisation, folder: Path) -> Path:
     )
     if found.measured is not None:
         axes.plot(*found.measured, "o", ms=3.5, color=SECOND, label="measured")
+    if found.angle_curve is not None:
+        d = np.linspace(0.0, float(found.angle_curve.displacement[-1]), 400)
+        axes.plot(d, np.degrees(found.angle_curve.at(d)), color=THIRD, lw=1.4, label="used for the law")
     if found.slip is not None and found.slip.displacement is not None and found.slip.interval is not None:
         axes.axvspan(*found.slip.interval, color="0.85", label="onset of slip, 95 %")
         axes.axvline(found.slip.displacement, color=MEAN, lw=0.9, ls=":")
@@ -186,14 +189,12 @@ def _shear(
 def _path(found: BiasExtensionCharacterisation) -> tuple[Floats, Floats]:
     """Displacements [mm] and the angles [rad] of the law there."""
     end = np.radians(found.interval_deg[1])
-    if found.angle_source == "kinematic" or found.measured is None:
+    if found.angle_curve is None or found.measured is None:
         d = np.linspace(0.0, min(float(found.mean.x[-1]), kinematic_limit(found.height, found.width)), 400)
         angle = kinematic_angle(d, found.height, found.width)
     else:
-        d, inverse = np.unique(found.measured[0], return_inverse=True)
-        angle = np.radians(
-            np.maximum(np.bincount(inverse, weights=found.measured[1]) / np.bincount(inverse), 0.0)
-        )
+        d = np.linspace(0.0, min(float(found.mean.x[-1]), float(found.measured[0][-1])), 400)
+        angle = found.angle_curve.at(d)
     used = angle <= end
     return d[used], angle[used]
 

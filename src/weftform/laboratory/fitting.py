@@ -55,6 +55,8 @@ class PolynomialFit:
         Of ``free_coefficients``, shape [p, p].
     deviations
         Of the coefficients of each specimen from the mean, shape [specimens, p]; empty for one specimen.
+    shared
+        Errors of the coefficients that all specimens share, drawn at random, shape [draws, p]; part of ``covariance``.
     valid_to
         End of the validity, in the variable of the polynomial.
     specimens, points
@@ -74,6 +76,7 @@ class PolynomialFit:
     free_coefficients: Floats
     covariance: Floats
     deviations: Floats
+    shared: Floats
     valid_to: float
     specimens: int
     points: int
@@ -157,7 +160,12 @@ class PolynomialFit:
             if not used.any():
                 return _student(level, self.freedom)
             draws = rng.standard_normal((SIMULATIONS, n, n)) @ curves[:, used]
-            ratio = np.abs(draws.mean(axis=1)) / (draws.std(axis=1, ddof=1) / np.sqrt(n))
+            error, variance = draws.mean(axis=1), draws.var(axis=1, ddof=1) / n
+            if len(self.shared):
+                common = self.shared @ basis.T[:, used] / np.sqrt(len(self.shared))
+                error = error + rng.standard_normal((SIMULATIONS, len(common))) @ common
+                variance = variance + (common**2).sum(axis=0)
+            ratio = np.abs(error) / np.sqrt(variance)
         else:
             scale, turn = np.linalg.eigh(self.covariance)
             root = turn * np.sqrt(np.maximum(scale, 0.0))
@@ -193,6 +201,7 @@ def fit_polynomial(
     *,
     monotone: bool = True,
     weighting: Weighting = "uniform",
+    designs_again: Sequence[Sequence[Floats]] = (),
 ) -> PolynomialFit:
     """Fit the coefficients over all points, each specimen with the same weight.
 
@@ -210,6 +219,9 @@ def fit_polynomial(
         Impose a rising polynomial on ``[0, valid_to]``.
     weighting
         ``uniform`` (errors of one size along the curve) or ``relative`` (errors in proportion to the value).
+    designs_again
+        ``designs`` as they might have been, where they come from a measurement that all specimens share (the angle).
+        The scatter of the coefficients over them is added to the covariance.
 
     Raises
     ------
@@ -233,8 +245,8 @@ def fit_polynomial(
         )
     scale = float(valid_to) ** np.asarray(powers, float)
     largest = max(float(np.abs(r).max()) for r in responses) or 1.0
-    rows = [d / scale / np.sqrt(len(d)) for d in designs]
-    values = [r / np.sqrt(len(r)) for r in responses]
+    weights = [np.full(len(r), 1.0 / np.sqrt(len(r))) for r in responses]
+    rows, values = _weighted(designs, responses, weights, scale)
     if np.linalg.matrix_rank(np.vstack(rows)) < p:
         raise MeasurementError(
             f"the points do not determine {p} coefficients",
@@ -245,8 +257,8 @@ def fit_polynomial(
     if weighting == "relative":
         # Weights from the first fit, not from the noisy values: those would favour every point that errs downwards.
         sizes = [np.maximum(np.abs(d @ (free / scale)) / largest, RELATIVE_FLOOR) for d in designs]
-        rows = [r / size[:, None] for r, size in zip(rows, sizes, strict=True)]
-        values = [v / size for v, size in zip(values, sizes, strict=True)]
+        weights = [w / size for w, size in zip(weights, sizes, strict=True)]
+        rows, values = _weighted(designs, responses, weights, scale)
         free = np.linalg.lstsq(np.vstack(rows), np.concatenate(values), rcond=None)[0]
     a, y = np.vstack(rows), np.concatenate(values)
     bread = np.linalg.inv(a.T @ a)
@@ -259,6 +271,12 @@ def fit_polynomial(
         freedom = points - p
         covariance = bread * float(residual @ residual) / freedom * _inflation(residual)
         deviations = np.empty((0, p))
+    shared = np.empty((len(designs_again), p))
+    for k, again in enumerate(designs_again):
+        rows_again, _ = _weighted(again, responses, weights, scale)
+        shared[k] = np.linalg.lstsq(np.vstack(rows_again), y, rcond=None)[0] - free
+    if len(shared):
+        covariance = covariance + shared.T @ shared / len(shared)
     best = _rising(a, y, free, powers) if monotone else free
     constrained = best is not free
     fitted = [d @ (best / scale) for d in designs]
@@ -271,6 +289,7 @@ def fit_polynomial(
         free_coefficients=free / scale,
         covariance=covariance / np.outer(scale, scale),
         deviations=deviations / scale,
+        shared=shared / scale,
         valid_to=float(valid_to),
         specimens=n,
         points=points,
@@ -279,6 +298,14 @@ def fit_polynomial(
         constrained=constrained,
         freedom=freedom,
     )
+
+
+def _weighted(
+    designs: Sequence[Floats], responses: Sequence[Floats], weights: Sequence[Floats], scale: Floats
+) -> tuple[list[Floats], list[Floats]]:
+    """Rows and values of the least-squares problem, per specimen, for scaled coefficients."""
+    rows = [d / scale * w[:, None] for d, w in zip(designs, weights, strict=True)]
+    return rows, [r * w for r, w in zip(responses, weights, strict=True)]
 
 
 def _inflation(residual: Floats) -> float:

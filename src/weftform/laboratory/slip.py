@@ -34,6 +34,8 @@ class SlipOnset:
         Kinematic minus measured angle at the end of the test, by the fitted line [deg].
     noise_deg
         Standard deviation of the measured angle about the fit [deg].
+    offset_deg
+        Kinematic minus measured angle before the onset [deg]: mostly the error of the first image, which all others share.
     """
 
     displacement: float | None
@@ -42,6 +44,7 @@ class SlipOnset:
     confidence: float
     departure_deg: float
     noise_deg: float
+    offset_deg: float
 
     @property
     def found(self) -> bool:
@@ -81,7 +84,7 @@ def slip_onset(
     kinematic = kinematic_deg[ok][order]
     n = len(d)
     if n < FEWEST_POINTS:
-        return SlipOnset(None, None, None, 0.0, 0.0, np.nan)
+        return SlipOnset(None, None, None, 0.0, 0.0, np.nan, 0.0)
     tried = np.linspace(d[0], d[-3], 401)
     null = float(((lag - lag.mean()) ** 2).sum())
     fits = [_best_onset(d, lag, kinematic, tried, shape) for shape in SHAPES]
@@ -98,7 +101,7 @@ def slip_onset(
     chance = min(1.0, float(f.sf(ratio, 1 + fit.terms, freedom)) * min(n, len(tried)) * len(fits))
     confidence = 1.0 - chance
     if confidence < least_confidence or departure < max(least_departure_deg, 2.0 * noise):
-        return SlipOnset(None, None, None, confidence, departure, noise)
+        return SlipOnset(None, None, None, confidence, departure, noise, float(lag.mean()))
     near = tried[(scores <= scores.min() + chi2.ppf(0.95, 1)).any(axis=0)]
     step = float(tried[1] - tried[0])
     return SlipOnset(
@@ -108,6 +111,7 @@ def slip_onset(
         confidence=confidence,
         departure_deg=departure,
         noise_deg=noise,
+        offset_deg=fit.offset,
     )
 
 
@@ -119,13 +123,14 @@ class _OnsetFit:
     squares: Floats
     smallest: float
     departure: float
+    offset: float
     terms: int
 
 
 def _best_onset(
     d: Floats, lag: Floats, kinematic: Floats, tried: Floats, shape: tuple[str, ...]
 ) -> _OnsetFit:
-    squares, departures = np.empty(len(tried)), np.empty(len(tried))
+    squares, departures, offsets = (np.empty(len(tried)) for _ in range(3))
     rate = np.gradient(kinematic, d, edge_order=1) if np.all(np.diff(d) > 0) else np.ones(len(d))
     for k, onset in enumerate(tried):
         past = d > onset
@@ -142,9 +147,16 @@ def _best_onset(
         if shape == ("share", "even"):
             first = float(c[1] * np.interp(onset, d, rate) + c[2])
         if first < 0.0:  # a lag that first shrinks is no slip
-            squares[k], departures[k] = ((lag - lag.mean()) ** 2).sum(), 0.0
+            squares[k], departures[k], offsets[k] = ((lag - lag.mean()) ** 2).sum(), 0.0, lag.mean()
             continue
         squares[k] = ((lag - a @ c) ** 2).sum()
-        departures[k] = a[-1, 1:] @ c[1:]
+        departures[k], offsets[k] = a[-1, 1:] @ c[1:], c[0]
     best = int(np.argmin(squares))
-    return _OnsetFit(float(tried[best]), squares, float(squares[best]), float(departures[best]), len(shape))
+    return _OnsetFit(
+        onset=float(tried[best]),
+        squares=squares,
+        smallest=float(squares[best]),
+        departure=float(departures[best]),
+        offset=float(offsets[best]),
+        terms=len(shape),
+    )

@@ -182,7 +182,7 @@ def characterise_tensile(
             expected=f"displacements in {start:g} to {end:g} mm",
             got=f"up to {mean.x[-1]:.4g} mm",
         )
-    reached = max(float(s.x[-1]) for s in used)
+    reached = max(float(s.x[-1]) for s in specimens)
     if interval is None:
         end = min(end, reached)
     elif end > 1.001 * reached:
