@@ -31,7 +31,7 @@ from weftform.laboratory.tabulating import TableFit, fit_table
 from weftform.laboratory.tensile import LawKind, fit_warnings
 
 AngleSource = Literal["auto", "kinematic", "measured"]
-ANGLE_DRAWS = 40
+ANGLE_DRAWS = 30
 """Times that a measured angle is drawn again from its noise, to see what it does to the law."""
 LARGEST_KINEMATIC_DEG = 60.0
 """Kinematic angle beyond which nothing is fitted unless asked for: yarns slip or the cloth folds long before."""
@@ -222,8 +222,8 @@ def characterise_bias_extension(
     if curve is not None and law == "polynomial":
         rng = np.random.default_rng(0)
         for _ in range(ANGLE_DRAWS):
-            drawn = curve.drawn_again(rng)
-            again.append([np.nan_to_num(drawn.at(d)) for d in used])
+            drawn = np.nan_to_num(curve.drawn_again(rng).at(np.concatenate(used)))
+            again.append(np.split(drawn, np.cumsum([len(d) for d in used])[:-1]))
     fit = _fit(xs, ys, again, height, width, reached, law, degree, monotone, weighting, knots)
     if isinstance(fit, PolynomialFit):
         warnings += fit_warnings(fit, "deg", "N", 180.0 / np.pi)

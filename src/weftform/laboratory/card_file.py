@@ -178,8 +178,9 @@ def _document(output: Path, base: str | Path | None) -> tuple[tomlkit.TOMLDocume
     source = Fabric.load(base)
     path = shipped_cards().get(str(base), Path(base))
     values, _ = read_toml(path, CardError)
-    # Comments are left behind: they describe the other fabric.
-    for key in ("fabric", "tension", "shear", "membrane"):
+    # Comments, weave and counts are left behind: they describe the other fabric.
+    document["fabric"] = _item({key: values["fabric"][key] for key in ("areal_weight_g_m2", "thickness_mm")})
+    for key in ("tension", "shear", "membrane"):
         if key in values:
             document[key] = _item(values[key])
     document["provenance"] = _item(

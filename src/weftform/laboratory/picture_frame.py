@@ -106,7 +106,7 @@ def characterise_picture_frame(
     law, degree, knots
         A table (the default: friction of the frame makes no polynomial), or a polynomial.
     interval_deg
-        Shear angles on which the law is fitted; by default all, to the largest force.
+        Shear angles on which the law is fitted; by default all that every specimen covers, to the largest force.
     monotone, weighting, locking, reading
         As in :func:`weftform.laboratory.bias_extension.characterise_bias_extension`.
 
@@ -135,10 +135,13 @@ def characterise_picture_frame(
     mean = average(curves)
     peak = int(np.argmax(mean.mean))
     if interval_deg is None:
-        last = float(mean.x[peak]) if peak < len(mean.x) - 1 else max(float(s.x[-1]) for s in curves)
+        start, end = 0.0, float(mean.x[peak])
         if peak < len(mean.x) - 1:
-            warnings.append(f"the mean force falls beyond {last:.4g} deg; the law ends there")
-        start, end = 0.0, last
+            warnings.append(f"the mean force falls beyond {end:.4g} deg; the law ends there")
+        elif max(float(s.x[-1]) for s in curves) > 1.02 * end:
+            warnings.append(
+                f"not every specimen goes beyond {end:.4g} deg; the law ends there (--to-deg moves it)"
+            )
     else:
         start, end = interval_deg
     if not 0.0 <= start < end < 90.0:

@@ -138,19 +138,15 @@ def shear_stages(
     angle = np.linspace(0.0, valid_to, 121)
     x, y = np.degrees(angle), law.value(angle)
     span = float(x[-1])
-    tried = span * np.linspace(0.05, 0.95, 61)
-    best: tuple[float, float, float, Floats] | None = None
-    for i, first in enumerate(tried):
-        for second in tried[i + 1 :]:
-            if second - first < 0.05 * span:
-                continue
-            a = np.column_stack([np.ones(len(x)), x, np.maximum(x - first, 0.0), np.maximum(x - second, 0.0)])
-            c = np.linalg.lstsq(a, y, rcond=None)[0]
-            rest = float(((y - a @ c) ** 2).sum())
-            if best is None or rest < best[0]:
-                best = (rest, float(first), float(second), c)
-    assert best is not None
-    _, first, second, c = best
+    coarse = np.linspace(0.05, 0.95, 19) * span
+    _, first, second, _ = _best_broken_line(x, y, coarse, coarse)
+    near = np.linspace(-0.05, 0.05, 11) * span
+    _, first, second, c = _best_broken_line(
+        x,
+        y,
+        np.clip(first + near, 0.05 * span, 0.95 * span),
+        np.clip(second + near, 0.05 * span, 0.95 * span),
+    )
     slopes = (float(c[1]), float(c[1] + c[2]), float(c[1] + c[2] + c[3]))
     locking: float | None
     if criterion is LockingCriterion.BROKEN_LINE:
@@ -171,3 +167,22 @@ def shear_stages(
             f"seen over 0-{span:.3g} deg"
         )
     return ShearStages(first, locking, slopes, words)
+
+
+def _best_broken_line(
+    x: Floats, y: Floats, firsts: Floats, seconds: Floats
+) -> tuple[float, float, float, Floats]:
+    """Sum of squares, the two knots and the coefficients of the best continuous line of three straight parts."""
+    best: tuple[float, float, float, Floats] | None = None
+    apart = 0.05 * float(x[-1] - x[0])
+    for first in firsts:
+        for second in seconds:
+            if second - first < apart * (1.0 - 1e-9):
+                continue
+            a = np.column_stack([np.ones(len(x)), x, np.maximum(x - first, 0.0), np.maximum(x - second, 0.0)])
+            c = np.linalg.lstsq(a, y, rcond=None)[0]
+            rest = float(((y - a @ c) ** 2).sum())
+            if best is None or rest < best[0]:
+                best = (rest, float(first), float(second), c)
+    assert best is not None  # the grids always hold knots far enough apart
+    return best
