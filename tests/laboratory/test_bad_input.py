@@ -1,11 +1,12 @@
-"""Every way a file can be wrong: it works with a warning that says what was done, or is refused with the place."""
+"""Every way a file can be wrong: it works with a warning that says what was done, or is refused with the
+place."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from paper_equations import bias_curve, eq4
+
 from weftform.errors import MeasurementError
 from weftform.laboratory import Reading, characterise_bias_extension, characterise_tensile
 

@@ -96,8 +96,12 @@ def test_measured_angle_from_a_column(text) -> None:
     from weftform.laboratory.samples import measured_angle
 
     g = measured_angle(d)
-    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(
-        d.tolist(), bias_force(g, SHEAR, 150, 50).tolist(), np.degrees(g).tolist(), strict=True)]  # fmt: skip
+    rows = [
+        f"{a!r},{b!r},{c!r}"
+        for a, b, c in zip(
+            d.tolist(), bias_force(g, SHEAR, 150, 50).tolist(), np.degrees(g).tolist(), strict=True
+        )
+    ]
     path = text("a.csv", "\n".join(["displacement_mm,force_N,shear_angle_deg", *rows]))
     found = characterise_bias_extension([path], **SIZE)
     assert found.angle_source == "measured"
@@ -144,13 +148,17 @@ def test_straight_shear_curve_has_no_locking(write) -> None:
 def test_cao_bias_tables_with_their_own_sizes() -> None:
     for name, width in (("150x300", 150.0), ("100x300", 100.0)):
         found = characterise_bias_extension(
-            sample("cao2008-bias-extension"), height=300.0, width=width, thickness=1.2, law="tabulated",
+            sample("cao2008-bias-extension"),
+            height=300.0,
+            width=width,
+            thickness=1.2,
+            law="tabulated",
             reading=Reading(only=(name,)),
-        )  # fmt: skip
+        )
         assert found.shear.fit.r_squared > 0.99 and found.shear.modulus_positive
 
 
-# Slip -------------------------------------------------------------------------------------------------------------
+# Slip
 
 
 def _slip(shape: str, seed: int, images: int = 76, end: float = 37.5):

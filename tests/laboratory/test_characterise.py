@@ -35,8 +35,19 @@ def _bias(*more, code: int = 0):
 def whole_card(tmp_path_factory):
     """A card made once from the shipped bias-extension specimens."""
     card = tmp_path_factory.mktemp("card") / "card.toml"
-    _run("bias-extension", *sample("bias-extension"), *SIZE, *NEW, "--tension-stiffness", 5000, "-o", card, "--no-figures",
-         "--to-deg", 20)  # fmt: skip
+    _run(
+        "bias-extension",
+        *sample("bias-extension"),
+        *SIZE,
+        *NEW,
+        "--tension-stiffness",
+        5000,
+        "-o",
+        card,
+        "--no-figures",
+        "--to-deg",
+        20,
+    )
     return card
 
 
@@ -80,8 +91,18 @@ def test_a_card_that_lacks_something_is_not_written(tmp_path) -> None:
 
 def test_new_card_from_another(tmp_path) -> None:
     card = tmp_path / "mine.toml"
-    _run("tensile", *sample("tensile-warp"), *SIZE, "--direction", "both", "--from", "hexforce-48600-c1300", "-o", card,
-         "--no-figures")  # fmt: skip
+    _run(
+        "tensile",
+        *sample("tensile-warp"),
+        *SIZE,
+        "--direction",
+        "both",
+        "--from",
+        "hexforce-48600-c1300",
+        "-o",
+        card,
+        "--no-figures",
+    )
     fabric = Fabric.load(card)
     assert fabric.name == "mine" and fabric.balanced and fabric.card.fabric.weave == ""
     assert "hexforce-48600-c1300" in fabric.card.provenance["taken_from"]
@@ -106,8 +127,21 @@ def test_update_keeps_the_comments_and_the_rest(tmp_path) -> None:
 def test_card_without_a_change_is_the_same_bytes(tmp_path) -> None:
     cards = [tmp_path / "a.toml", tmp_path / "b.toml"]
     for card in cards:
-        _run("tensile", *sample("tensile-warp"), *SIZE, *NEW, "--direction", "both", "--shear-modulus", 0.1, "--name", "x",
-             "-o", card, "--no-figures")  # fmt: skip
+        _run(
+            "tensile",
+            *sample("tensile-warp"),
+            *SIZE,
+            *NEW,
+            "--direction",
+            "both",
+            "--shear-modulus",
+            0.1,
+            "--name",
+            "x",
+            "-o",
+            card,
+            "--no-figures",
+        )
     assert cards[0].read_bytes() == cards[1].read_bytes()
 
 
@@ -141,8 +175,22 @@ def test_card_that_would_not_be_valid_is_refused_and_nothing_written(tmp_path, w
     u = np.linspace(0.0, 3.0, 100)
     path = write("falls.csv", u, np.sin(u) * 100.0)
     card = tmp_path / "card.toml"
-    result = _run("tensile", path, *SIZE, *NEW, "--shear-modulus", 0.1, "--direction", "both", "--not-monotone",
-                  "--to-mm", 2.9, "-o", card, code=2)  # fmt: skip
+    result = _run(
+        "tensile",
+        path,
+        *SIZE,
+        *NEW,
+        "--shear-modulus",
+        0.1,
+        "--direction",
+        "both",
+        "--not-monotone",
+        "--to-mm",
+        2.9,
+        "-o",
+        card,
+        code=2,
+    )
     assert "nothing is written" in result.output and "not monotone" in result.output
     assert list(tmp_path.iterdir()) == [path]
     _run(
@@ -182,8 +230,20 @@ def test_figures_are_drawn_beside_the_card(tmp_path) -> None:
     }
     _run("tensile", *sample("tensile-warp"), *SIZE, "--figures", tmp_path / "f")
     assert (tmp_path / "f" / "tensile-warp.png").stat().st_size > 10_000
-    _run("picture-frame", *sample("cao2008-picture-frame"), "--only", "UML", "--height", 100, "--width", 100,
-         "--thickness", 1.2, "--figures", tmp_path / "f")  # fmt: skip
+    _run(
+        "picture-frame",
+        *sample("cao2008-picture-frame"),
+        "--only",
+        "UML",
+        "--height",
+        100,
+        "--width",
+        100,
+        "--thickness",
+        1.2,
+        "--figures",
+        tmp_path / "f",
+    )
     assert len(list((tmp_path / "f").iterdir())) == 3
 
 
@@ -194,7 +254,8 @@ def test_help_needs_no_heavy_import() -> None:
     code = (
         "import sys\nfrom typer.testing import CliRunner\nfrom weftform.cli.characterise import app\n"
         "r = CliRunner().invoke(app, ['tensile', '--help'])\nassert r.exit_code == 0, r.output\n"
-        "heavy = {'numpy', 'scipy', 'matplotlib', 'numba', 'tomlkit'} & set(sys.modules)\nassert not heavy, heavy"
+        "heavy = {'numpy', 'scipy', 'matplotlib', 'numba', 'tomlkit'} & set(sys.modules)\nassert not heavy, "
+        "heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from paper_equations import eq4, eq8
+from scipy.integrate import trapezoid
 
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import first_fall
@@ -40,7 +41,8 @@ def test_eq7_returns_eq8_exactly() -> None:
 
 
 def test_eq7_is_the_energy_balance_over_the_zones() -> None:
-    """The force does the work of the torques of zones B and C, in small steps of the angle, without use of Eq. 5."""
+    """The force does the work of the torques of zones B and C, in small steps of the angle, without use of
+    Eq. 5."""
     height, width = 150.0, 50.0
     g = np.radians(np.linspace(0.0, 40.0, 4001))
     torque = eq8(g) * np.cos(g)
@@ -59,9 +61,9 @@ def test_picture_frame_lever_is_the_energy_balance() -> None:
     d = np.linspace(0.0, 60.0, 4001)
     g = frame_angle(d, side)
     force = frame_lever(g, side, cloth) * eq8(g)
-    done = np.trapezoid(force, d) if hasattr(np, "trapezoid") else np.trapz(force, d)
+    done = trapezoid(force, d)
     power = eq8(g) * np.cos(g) * cloth**2
-    work = np.trapezoid(power, g) if hasattr(np, "trapezoid") else np.trapz(power, g)
+    work = trapezoid(power, g)
     assert done == pytest.approx(work, rel=1e-6)
 
 

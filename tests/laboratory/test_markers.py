@@ -114,7 +114,8 @@ def test_layout_errors_name_the_place(text) -> None:
 def test_shipped_markers_by_zone_and_half() -> None:
     tracking = track_markers(sample("bias-extension-markers")[0], sample("bias-extension-layout")[0])
     truth = np.degrees(measured_angle(tracking.displacement))
-    # 0.02 mm of noise on sides of 8 mm: 0.3 deg for one quadruple against its reference image, five times that here.
+    # 0.02 mm of noise on sides of 8 mm: 0.3 deg for one quadruple against its reference image, five times
+    # that here.
     for zone, share in (("A", 0.06), ("B", 1.0), ("C", 0.45)):
         for half in (None, "upper", "lower"):
             np.testing.assert_allclose(tracking.zone(zone, half).mean, share * truth, atol=1.5)

@@ -79,7 +79,8 @@ def test_every_laboratory_of_cao_yields_a_valid_card(laboratory, law, tmp_path) 
     angle, force = (table.values[q][own] for q in columns)
     inside = np.radians(angle) <= fabric.shear.valid_to
     misfit = fabric.normalised_shear_force(np.radians(angle[inside])) - force[inside]
-    # The scatter between the laboratories is some tens of per cent; reading the figure off costs about 1 % of its range.
+    # The scatter between the laboratories is some tens of per cent; reading the figure off costs about 1 %
+    # of its range.
     limit = 0.01 if law == "tabulated" else 0.03
     assert np.sqrt(np.mean(misfit**2)) < limit * force.max()
     assert inside.mean() > 0.9

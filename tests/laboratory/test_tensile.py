@@ -40,7 +40,8 @@ def test_stages_of_a_curve_with_known_stages() -> None:
     f = np.where(u < 2, 250 * u**2, 1000 + 1000 * (u - 2))
     f = np.where(u > 4, 3000 - 1500 * (u - 4), f)
     stages = tensile_stages(u, f)
-    # The parabola leaves its tangent by the tolerance (1 % of 3000 N, shared above and below the line) at most so far out:
+    # The parabola leaves its tangent by the tolerance (1 % of 3000 N, shared above and below the line) at
+    # most so far out:
     early = np.sqrt(2 * stages.tolerance / 250)
     assert 2.0 - early <= stages.crimp_end <= 2.0
     assert stages.linear_end == pytest.approx(4.0, abs=0.05) and stages.damage

@@ -21,7 +21,8 @@ class MeanCurve:
     x
         Common grid over the range that every specimen covers, shape [m].
     mean, deviation
-        Mean and standard deviation between specimens at each ``x``, shape [m]; the deviation is NaN for one specimen.
+        Mean and standard deviation between specimens at each ``x``, shape [m]; the deviation is NaN for one
+        specimen.
     lowest, highest
         Envelope of the specimens, shape [m].
     specimens

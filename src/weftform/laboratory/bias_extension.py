@@ -34,7 +34,8 @@ AngleSource = Literal["auto", "kinematic", "measured"]
 ANGLE_DRAWS = 30
 """Times that a measured angle is drawn again from its noise, to see what it does to the law."""
 LARGEST_KINEMATIC_DEG = 60.0
-"""Kinematic angle beyond which nothing is fitted unless asked for: yarns slip or the cloth folds long before."""
+"""Kinematic angle beyond which nothing is fitted unless asked for: yarns slip or the cloth folds long
+before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,8 @@ class BiasExtensionCharacterisation:
     tracking
         Marker measurements, if any.
     measured
-        Displacements [mm] and measured angles of zone B [deg], two arrays of one shape; None without measurement.
+        Displacements [mm] and measured angles of zone B [deg], two arrays of one shape; None without
+        measurement.
     slip
         Onset of slip; None without measured angles.
     angle_curve
@@ -89,7 +91,8 @@ class BiasExtensionCharacterisation:
         """The table ``shear`` of a fabric card."""
         n = len(self.specimens)
         return self.shear.card_table(
-            f"Bias-extension tests of {n} specimen{'s' if n > 1 else ''} {self.height:g} x {self.width:g} mm, "
+            f"Bias-extension tests of {n} specimen{'s' if n > 1 else ''} {self.height:g} x {self.width:g} "
+            f"mm, "
             f"{self.angle_source} angle, Eq. 5; see provenance"
         )
 
@@ -116,7 +119,8 @@ def characterise_bias_extension(
     Parameters
     ----------
     files
-        Force against displacement, one or several specimens each; a column ``shear_angle_deg`` counts as measured angle.
+        Force against displacement, one or several specimens each; a column ``shear_angle_deg`` counts as
+        measured angle.
     height, width
         Of the specimens [mm]; the height is the free length between the clamps.
     thickness
@@ -124,12 +128,13 @@ def characterise_bias_extension(
     tracking
         Marker measurements; the mean of zone B is the measured angle.
     angle
-        ``kinematic`` (Eqs. 1-2), ``measured``, or ``auto``: measured where slip is found, kinematic otherwise.
+        ``kinematic`` (Eqs. 1-2), ``measured``, or ``auto``: measured where slip is found, kinematic
+        otherwise.
     law, degree, knots
         Polynomial of that degree (Eq. 8 has 5), or a table.
     interval_deg
-        Shear angles on which the law is fitted. By default from zero to the peak of the force; with the kinematic angle
-        no further than the onset of slip, nor than 60 degrees.
+        Shear angles on which the law is fitted. By default from zero to the peak of the force; with the
+        kinematic angle no further than the onset of slip, nor than 60 degrees.
     monotone
         Impose a rising F_sh, that is G12 >= 0.
     weighting
@@ -181,7 +186,8 @@ def characterise_bias_extension(
     beyond = [s.name for s in specimens if s.x[-1] >= limit]
     if curve is None and beyond:
         warnings.append(
-            f"{', '.join(beyond)}: displacements beyond {limit:.4g} mm, where yarns without slip would be parallel, have no "
+            f"{', '.join(beyond)}: displacements beyond {limit:.4g} mm, where yarns without slip would be "
+            f"parallel, have no "
             "kinematic angle and are left out"
         )
     start, end = interval_deg or (0.0, _end_of_interval(mean, curve, slip, height, width, warnings))
@@ -287,7 +293,8 @@ def _check_travel(specimens: Sequence[Specimen], height: float, width: float) ->
     for s in specimens:
         if s.x[-1] > most:
             raise MeasurementError(
-                f"{s.name}: a displacement of {s.x[-1]:.4g} mm is not one of a bias-extension test of {height:g} x {width:g} mm",
+                f"{s.name}: a displacement of {s.x[-1]:.4g} mm is not one of a bias-extension test of "
+                f"{height:g} x {width:g} mm",
                 file=s.file,
                 line=int(s.lines[np.argmax(s.x > most)]),
                 expected=f"at most {most:.4g} mm (yarns are parallel at {most / 2:.4g} mm)",
@@ -333,17 +340,20 @@ def _end_of_interval(
     if slip is not None and slip.displacement is not None and slip.displacement < d:
         d = slip.displacement
         warnings.append(
-            f"yarns slip from {d:.4g} mm on ({slip.angle_deg:.3g} deg): the kinematic angle holds no further, the law ends "
+            f"yarns slip from {d:.4g} mm on ({slip.angle_deg:.3g} deg): the kinematic angle holds no "
+            f"further, the law ends "
             "there"
         )
     elif slip is None:
         warnings.append(
-            "no measured angle, so slip cannot be seen: the kinematic angle is taken at its word to the end of the law"
+            "no measured angle, so slip cannot be seen: the kinematic angle is taken at its word to the end "
+            "of the law"
         )
     widest = float(kinematic_displacement(np.radians(LARGEST_KINEMATIC_DEG), height, width))
     if d > widest:
         d = widest
         warnings.append(
-            f"the law ends at {LARGEST_KINEMATIC_DEG:g} deg of kinematic shear ({d:.4g} mm); --to-deg moves it"
+            f"the law ends at {LARGEST_KINEMATIC_DEG:g} deg of kinematic shear ({d:.4g} mm); --to-deg moves "
+            f"it"
         )
     return float(np.degrees(kinematic_angle(d, height, width)))

@@ -107,8 +107,8 @@ def write_card(
     Raises
     ------
     CardError
-        The card lacks something (all of it is listed, with where to get it), contradicts an option, or would not be
-        valid. Nothing is written then.
+        The card lacks something (all of it is listed, with where to get it), contradicts an option, or
+        would not be valid. Nothing is written then.
     """
     if output.suffix != ".toml":
         raise CardError("a card is a TOML file", file=output, expected="a name ending in .toml")
@@ -119,9 +119,11 @@ def write_card(
         document["name"] = name or output.stem
     elif name is not None and document.get("name") != name:
         raise CardError(
-            f"the card is named {document.get('name')}, the option says {name}", file=output, key="name",
+            f"the card is named {document.get('name')}, the option says {name}",
+            file=output,
+            key="name",
             hint="leave --name out, or write to another file",
-        )  # fmt: skip
+        )
     for place, value in (defaults or {}).items():
         old = _find(document, place)
         if old is None or (fresh and place[0] == "fabric"):
@@ -166,9 +168,10 @@ def _document(output: Path, base: str | Path | None) -> tuple[tomlkit.TOMLDocume
     if output.exists():
         if base is not None:
             raise CardError(
-                "the card exists, so it is updated and takes nothing from another", file=output,
+                "the card exists, so it is updated and takes nothing from another",
+                file=output,
                 hint="leave --from out, or write to another file",
-            )  # fmt: skip
+            )
         _, text = read_toml(output, CardError)
         return tomlkit.parse(text), False
     document = tomlkit.document()

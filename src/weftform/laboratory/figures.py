@@ -30,8 +30,10 @@ def draw_tensile(found: TensileCharacterisation, folder: Path) -> list[Path]:
     figure, axes = _page(
         "Elongation (mm)",
         "Force (N)",
-        f"Tensile test along the {found.direction}, {_count(found.specimens)}, {found.length:g} x {found.width:g} mm. "
-        f"Stages: crimp to {found.stages.crimp_end:.2f} mm, linear to {found.stages.linear_end:.2f} mm (straight within "
+        f"Tensile test along the {found.direction}, {_count(found.specimens)}, {found.length:g} x "
+        f"{found.width:g} mm. "
+        f"Stages: crimp to {found.stages.crimp_end:.2f} mm, linear to {found.stages.linear_end:.2f} mm "
+        f"(straight within "
         f"{found.stages.tolerance:.0f} N){', then damage' if found.stages.damage else ''}. "
         f"Law over {found.interval[0]:.2f}-{found.interval[1]:.2f} mm, rms {found.fit.rms:.0f} N.",
     )
@@ -42,8 +44,17 @@ def draw_tensile(found: TensileCharacterisation, folder: Path) -> list[Path]:
     _shade(axes, u, found.force_band(u))
     for place, name in ((found.stages.crimp_end, "crimp"), (found.stages.linear_end, "linear")):
         axes.axvline(place, color=SECOND, lw=0.9, ls=":")
-        axes.text(place, 0.02, f"{name} ends ", rotation=90, ha="right", va="bottom", color=SECOND, fontsize=8,
-                  transform=axes.get_xaxis_transform())  # fmt: skip
+        axes.text(
+            place,
+            0.02,
+            f"{name} ends ",
+            rotation=90,
+            ha="right",
+            va="bottom",
+            color=SECOND,
+            fontsize=8,
+            transform=axes.get_xaxis_transform(),
+        )
     return [_save(figure, axes, folder / f"tensile-{found.direction}.png")]
 
 
@@ -54,8 +65,10 @@ def draw_bias_extension(found: BiasExtensionCharacterisation, folder: Path) -> l
     figure, axes = _page(
         "Displacement (mm)",
         "Force (N)",
-        f"Bias-extension test, {_count(found.specimens)}, {size}. The law is Eq. 8 put back through Eq. 5 at the "
-        f"{found.angle_source} shear angle, fitted over {found.interval_deg[0]:.3g}-{found.interval_deg[1]:.3g} degrees.",
+        f"Bias-extension test, {_count(found.specimens)}, {size}. The law is Eq. 8 put back through Eq. 5 "
+        f"at the "
+        f"{found.angle_source} shear angle, fitted over "
+        f"{found.interval_deg[0]:.3g}-{found.interval_deg[1]:.3g} degrees.",
     )
     _specimens(axes, found.specimens)
     _mean(axes, found.mean.x, found.mean.mean, found.mean.deviation)
@@ -121,7 +134,8 @@ def _zones(found: BiasExtensionCharacterisation, folder: Path) -> Path:
     figure, axes = _page(
         "Displacement (mm)",
         "Shear angle (deg)",
-        "Shear angles of marker quadruples: mean of each zone with one standard deviation between quadruples; "
+        "Shear angles of marker quadruples: mean of each zone with one standard deviation between "
+        "quadruples; "
         "triangles up and down are the upper and lower half of the specimen.",
     )
     tracking = found.tracking[0]
@@ -151,7 +165,8 @@ def _shear(
     figure, axes = _page(
         "Shear angle (deg)",
         "Normalised shear force (N/mm)",
-        f"Normalised shear force from a {caption}. Placing to {stages.placing_end_deg:.3g} degrees, {locking} "
+        f"Normalised shear force from a {caption}. Placing to {stages.placing_end_deg:.3g} degrees, "
+        f"{locking} "
         f"({stages.criterion}).",
     )
     if measured is not None:
@@ -165,7 +180,8 @@ def _shear(
     figure, axes = _page(
         "Shear angle (rad)",
         "Shear stress, shear modulus (MPa)",
-        f"Shear stress (Eq. 9), shear modulus (Eq. 10) and normalised shear force (Eq. 8, right axis) from a {caption}, "
+        f"Shear stress (Eq. 9), shear modulus (Eq. 10) and normalised shear force (Eq. 8, right axis) from "
+        f"a {caption}, "
         f"thickness {shear.thickness:g} mm.",
     )
     axes.plot(angle, shear.stress(angle), color=LAW, lw=2, label="shear stress (left)")

@@ -1,9 +1,9 @@
-"""Least squares for a polynomial law: over all points of all specimens, monotone, with a band that means something.
+"""Least squares for a polynomial law: over all points of all specimens, monotone, with a band.
 
-The unknowns are the coefficients of ``c1 x + c2 x^2 + ...``; the measured quantity is any linear function of them, so the
-tensile force (Eq. 3) and the bias-extension force (Eq. 7) are fitted by the same lines of code. Specimens, not points, are
-the independent repetitions of a test: neighbouring points of one curve share its errors. The band therefore comes from how
-much the specimens differ from each other.
+The unknowns are the coefficients of ``c1 x + c2 x^2 + ...``; the measured quantity is any linear function
+of them, so the tensile force (Eq. 3) and the bias-extension force (Eq. 7) are fitted by the same lines of
+code. Specimens, not points, are the independent repetitions of a test: neighbouring points of one curve
+share its errors. The band therefore comes from how much the specimens differ from each other.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ SIMULATIONS = 4000
 LEAST_SLOPE = 1.0e-6
 """Smallest slope of a monotone fit, relative to its mean slope; keeps rounding from turning 0 into a fall."""
 RELATIVE_FLOOR = 0.02
-"""Relative weighting counts every value as at least this share of the largest, or the first points would rule."""
+"""Relative weighting counts every value as at least this share of the largest, or the first points would
+rule."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ class PolynomialFit:
     deviations
         Of the coefficients of each specimen from the mean, shape [specimens, p]; empty for one specimen.
     shared
-        Errors of the coefficients that all specimens share, drawn at random, shape [draws, p]; part of ``covariance``.
+        Errors of the coefficients that all specimens share, drawn at random, shape [draws, p]; part of
+        ``covariance``.
     valid_to
         End of the validity, in the variable of the polynomial.
     specimens, points
@@ -120,9 +122,10 @@ class PolynomialFit:
         """Confidence band of the curve or of its slope at ``x`` (shape [m]).
 
         A simultaneous band holds the whole true curve over ``x`` with the stated probability; a pointwise one
-        holds it at any one place, and is narrower. The critical value is the quantile of ``max |mean| / standard error`` over simulated
-        sets of as many specimens with the covariance found (one specimen: of a multivariate t); seeded, so always the same.
-        The band is widened, never narrowed, to hold the monotone fit where the constraint acts.
+        holds it at any one place, and is narrower. The critical value is the quantile of ``max |mean| /
+        standard error`` over simulated sets of as many specimens with the covariance found (one specimen:
+        of a multivariate t); seeded, so always the same. The band is widened, never narrowed, to hold the
+        monotone fit where the constraint acts.
 
         Raises
         ------
@@ -220,8 +223,8 @@ def fit_polynomial(
     weighting
         ``uniform`` (errors of one size along the curve) or ``relative`` (errors in proportion to the value).
     designs_again
-        ``designs`` as they might have been, where they come from a measurement that all specimens share (the angle).
-        The scatter of the coefficients over them is added to the covariance.
+        ``designs`` as they might have been, where they come from a measurement that all specimens share
+        (the angle). The scatter of the coefficients over them is added to the covariance.
 
     Raises
     ------
@@ -230,9 +233,10 @@ def fit_polynomial(
 
     Notes
     -----
-    The covariance of the mean over ``n`` specimens is that of their scores (the cluster-robust or sandwich estimate), which for
-    specimens sampled alike is the covariance of the separately fitted coefficients divided by ``n``. A single specimen has no
-    such scatter: the covariance then comes from the residuals, corrected for their correlation along the curve.
+    The covariance of the mean over ``n`` specimens is that of their scores (the cluster-robust or sandwich
+    estimate), which for specimens sampled alike is the covariance of the separately fitted coefficients
+    divided by ``n``. A single specimen has no such scatter: the covariance then comes from the residuals,
+    corrected for their correlation along the curve.
     """
     p, n = len(powers), len(designs)
     points = sum(len(r) for r in responses)
@@ -255,7 +259,8 @@ def fit_polynomial(
         )
     free = np.linalg.lstsq(np.vstack(rows), np.concatenate(values), rcond=None)[0]
     if weighting == "relative":
-        # Weights from the first fit, not from the noisy values: those would favour every point that errs downwards.
+        # Weights from the first fit, not from the noisy values: those would favour every point that errs
+        # downwards.
         sizes = [np.maximum(np.abs(d @ (free / scale)) / largest, RELATIVE_FLOOR) for d in designs]
         weights = [w / size for w, size in zip(weights, sizes, strict=True)]
         rows, values = _weighted(designs, responses, weights, scale)
@@ -317,7 +322,7 @@ def _inflation(residual: Floats) -> float:
 
 
 def _rising(a: Floats, y: Floats, free: Floats, powers: Sequence[int]) -> Floats:
-    """The least-squares coefficients (x scaled to 0..1) whose polynomial rises; ``free`` itself where it does.
+    """Least-squares coefficients (x scaled to 0..1) whose polynomial rises; ``free`` itself where it does.
 
     Slope constraints are put where the slope is smallest, solved, and put again until it falls nowhere.
     """
@@ -348,7 +353,7 @@ def _lowest_slopes(coefficients: Floats, powers: Sequence[int]) -> Floats:
 
 
 def _bounded(a: Floats, y: Floats, g: Floats, h: Floats) -> Floats:
-    """Minimise ``|a c - y|`` subject to ``g c >= h``: least distance programming on non-negative least squares.
+    """Minimise ``|a c - y|`` subject to ``g c >= h`` by non-negative least squares.
 
     Reference: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
     """

@@ -42,8 +42,9 @@ def shear_field(
 ) -> ShearField:
     """Shear angles from displacements, free of any definition of strain.
 
-    The points are triangulated in the undeformed state; in each triangle the deformation gradient is constant and turns and
-    stretches the two yarn directions, whose angle is compared with the right angle they started from.
+    The points are triangulated in the undeformed state; in each triangle the deformation gradient is
+    constant and turns and stretches the two yarn directions, whose angle is compared with the right angle
+    they started from.
 
     Parameters
     ----------

@@ -35,15 +35,15 @@ def check_bias_specimen(height: float, width: float) -> None:
 
 
 def kinematic_limit(height: float, width: float) -> float:
-    """Displacement [mm] at which yarns that do not stretch or slip would lie parallel: (sqrt 2 - 1)(H - W)."""
+    """Displacement [mm] at which yarns without stretch or slip lie parallel: (sqrt 2 - 1)(H - W)."""
     return float(np.sqrt(2.0) - 1.0) * (height - width)
 
 
 def kinematic_angle(displacement: Floats | float, height: float, width: float) -> Floats:
     """Shear angle [rad] of zone B for inextensible yarns without slip (Eqs. 1 and 2).
 
-    ``gamma = asin((1 + d / D)^2 - 1)`` with ``D = H - W``, the diagonal of zone B; the angle stays at 90 degrees beyond
-    :func:`kinematic_limit`. It equals ``90 deg - 2 acos((D + d) / (sqrt 2 D))``.
+    ``gamma = asin((1 + d / D)^2 - 1)`` with ``D = H - W``, the diagonal of zone B; the angle stays at 90
+    degrees beyond :func:`kinematic_limit`. It equals ``90 deg - 2 acos((D + d) / (sqrt 2 D))``.
     """
     stretch = 1.0 + np.asarray(displacement, float) / (height - width)
     return np.arcsin(np.clip(stretch**2 - 1.0, -1.0, 1.0))
@@ -55,14 +55,15 @@ def kinematic_displacement(angle: Floats | float, height: float, width: float) -
 
 
 def bias_design(angle: Floats, height: float, width: float, basis: Callable[[Floats], Floats]) -> Floats:
-    """Force [N] of a bias-extension test per unit of each coefficient of F_sh, shape [points, p] (Eq. 7, solved for F).
+    """Force [N] of the test per unit of each coefficient of F_sh, shape [points, p] (Eq. 7 solved for F).
 
     With ``F_sh = sum_k a_k b_k(gamma)`` the energy balance of the test (Eq. 5) reads ::
 
         F (H/W - 1)(cos g/2 - sin g/2) = sum_k a_k [ (2H - 3W) cos(g) b_k(g) + W cos(g/2) b_k(g/2) ]
 
-    which is linear in ``a_k``. Errors of measurement are in F, so this is the form to put into least squares. For powers
-    ``b_k(g) = g^k`` it is Eq. 7 multiplied by known factors, with ``x z / 2^k`` added in its bracket and ``z = W cos(g/2)``.
+    which is linear in ``a_k``. Errors of measurement are in F, so this is the form to put into least
+    squares. For powers ``b_k(g) = g^k`` it is Eq. 7 multiplied by known factors, with ``x z / 2^k`` added
+    in its bracket and ``z = W cos(g/2)``.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def bias_design(angle: Floats, height: float, width: float, basis: Callable[[Flo
 
 
 def bias_force(angle: Floats, coefficients: Sequence[float], height: float, width: float) -> Floats:
-    """Force [N] of the test for F_sh = sum_k coefficients[k-1] gamma^k [N/mm] at shear angles of zone B [rad]."""
+    """Force [N] at shear angles of zone B [rad] for F_sh [N/mm] with coefficients of gamma, gamma^2, ..."""
     powers = np.arange(1, len(coefficients) + 1)
     design = bias_design(np.atleast_1d(angle), height, width, lambda g: g[:, None] ** powers)
     return np.asarray(design @ np.asarray(coefficients, float)).reshape(np.shape(angle))
@@ -105,8 +106,8 @@ def frame_limit(frame_side: float) -> float:
 def frame_lever(angle: Floats, frame_side: float, fabric_side: float) -> Floats:
     """Force [N] of a picture frame per unit of normalised shear force [N/mm].
 
-    ``F = 2 cos(pi/4 - gamma/2) F_sh L_fabric^2 / L_frame``: the normalisation of Cao et al. (2008), and the energy balance
-    ``F dd = C_s L_fabric^2 dgamma`` with ``C_s = F_sh cos(gamma)``.
+    ``F = 2 cos(pi/4 - gamma/2) F_sh L_fabric^2 / L_frame``: the normalisation of Cao et al. (2008), and the
+    energy balance ``F dd = C_s L_fabric^2 dgamma`` with ``C_s = F_sh cos(gamma)``.
     """
     return np.asarray(
         2.0 * np.cos(0.25 * np.pi - 0.5 * np.asarray(angle, float)) * fabric_side**2 / frame_side

@@ -1,4 +1,4 @@
-"""Marker tracking on a bias-extension specimen: shear angles of quadruples of markers, zone by zone (Sec. 2.3.2)."""
+"""Marker tracking on a bias-extension specimen: shear angles zone by zone (Sec. 2.3.2)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ Axis = Literal["x", "y"]
 class Quadruple(Declared):
     """Four markers at the corners of a rhombus whose sides lie along the yarns, named in order around it.
 
-    ``zone`` is A (at the clamp, undeformed), B (centre, pure shear) or C (half shear); ``half`` of the specimen.
+    ``zone`` is A (at the clamp, undeformed), B (centre, pure shear) or C (half shear); ``half`` of the
+    specimen.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -153,8 +154,9 @@ def corner_angle(before: Floats, corner: Floats, after: Floats) -> Floats:
 def quadruple_angles(corners: Floats, pull: Axis = "y") -> Floats:
     """Shear angle [rad] of a quadruple over the images, shape [images].
 
-    At each corner the change of the angle since the first image; corners on the diagonal nearer to the pull close, the others
-    open by as much. The mean is taken over the corners that can be seen: one lost marker leaves the corner opposite to it.
+    At each corner the change of the angle since the first image; corners on the diagonal nearer to the pull
+    close, the others open by as much. The mean is taken over the corners that can be seen: one lost marker
+    leaves the corner opposite to it.
 
     Parameters
     ----------
@@ -194,8 +196,9 @@ def track_markers(
     Parameters
     ----------
     positions
-        One row per image and marker: ``image``, ``marker``, ``x_mm``, ``y_mm``, ``z_mm`` where triangulated, and
-        ``displacement_mm`` of the crosshead unless ``displacements`` has it. A lost marker has no row or no coordinates.
+        One row per image and marker: ``image``, ``marker``, ``x_mm``, ``y_mm``, ``z_mm`` where
+        triangulated, and ``displacement_mm`` of the crosshead unless ``displacements`` has it. A lost
+        marker has no row or no coordinates.
     layout
         The quadruples, or the TOML file with them.
     displacements
@@ -206,8 +209,8 @@ def track_markers(
     Raises
     ------
     MeasurementError
-        The table cannot be read, an image has no displacement, a marker appears twice in an image, or no quadruple is complete
-        in the first image.
+        The table cannot be read, an image has no displacement, a marker appears twice in an image, or no
+        quadruple is complete in the first image.
     """
     if not isinstance(layout, MarkerLayout):
         layout = read_layout(layout)
@@ -238,7 +241,8 @@ def track_markers(
         gone = [m for m, c in zip(quad.markers, corners[0], strict=True) if not np.isfinite(c).all()]
         if gone:
             warnings.append(
-                f"{table.file.name}: quadruple {quad.name} left out, marker {', '.join(gone)} is not in image {images[0]}"
+                f"{table.file.name}: quadruple {quad.name} left out, marker {', '.join(gone)} is not in "
+                f"image {images[0]}"
             )
             continue
         angle = np.degrees(quadruple_angles(corners, pull))

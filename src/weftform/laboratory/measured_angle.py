@@ -1,7 +1,8 @@
 """The measured shear angle of zone B as a smooth curve of displacement, with its uncertainty.
 
-Angles enter Eq. 5 with high powers, so noise in them would bias the law and not only scatter it. Up to the onset of slip the
-kinematic angle is the better measurement: it has no noise, and that it holds there is what "no slip" means.
+Angles enter Eq. 5 with high powers, so noise in them would bias the law and not only scatter it. Up to the
+onset of slip the kinematic angle is the better measurement: it has no noise, and that it holds there is
+what "no slip" means.
 """
 
 from __future__ import annotations
@@ -51,8 +52,9 @@ class MeasuredAngle:
     def at(self, displacement: Floats) -> Floats:
         """Smooth shear angle [rad] at displacements [mm]; NaN beyond the last measurement.
 
-        With slip: the kinematic angle up to the onset, then a smoothing spline through the measured angles (less the common
-        error of the first image) that starts from it. Without: kinematic angle less a smoothing spline of the lag.
+        With slip: the kinematic angle up to the onset, then a smoothing spline through the measured angles
+        (less the common error of the first image) that starts from it. Without: kinematic angle less a
+        smoothing spline of the lag.
         """
         d = np.asarray(displacement, float)
         kinematic = kinematic_angle(d, self.height, self.width)
@@ -71,7 +73,7 @@ class MeasuredAngle:
         return np.where((d <= self.displacement[-1]) & (angle >= 0.0), angle, np.nan)
 
     def drawn_again(self, rng: np.random.Generator) -> MeasuredAngle:
-        """The measurement as it might have come out: noise on each angle, and the onset and offset that go with it."""
+        """The measurement as it might have come out: other noise, with the onset and offset it brings."""
         noise = self.slip.noise_deg if np.isfinite(self.slip.noise_deg) else 0.0
         error = noise * rng.standard_normal(len(self.displacement))
         slip = self.slip
@@ -87,7 +89,7 @@ class MeasuredAngle:
 
 
 def _spline(x: Floats, y: Floats, weight: Floats, at: Floats) -> Floats:
-    """Cubic smoothing spline with the smoothness that generalised cross-validation chooses; straight for few points."""
+    """Cubic smoothing spline chosen by generalised cross-validation; straight between few points."""
     from scipy.interpolate import make_smoothing_spline
 
     inside = np.clip(at, x[0], x[-1])

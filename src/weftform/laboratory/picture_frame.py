@@ -70,7 +70,8 @@ class PictureFrameCharacterisation:
         """The table ``shear`` of a fabric card."""
         n = len(self.specimens)
         return self.shear.card_table(
-            f"Picture-frame tests of {n} specimen{'s' if n > 1 else ''} ({', '.join(s.name for s in self.specimens)}), "
+            f"Picture-frame tests of {n} specimen{'s' if n > 1 else ''} "
+            f"({', '.join(s.name for s in self.specimens)}), "
             "constant-thickness normalisation; see provenance"
         )
 
@@ -102,11 +103,13 @@ def characterise_picture_frame(
     thickness
         Of the fabric [mm].
     measured
-        What the files hold; ``auto`` takes normalised forces where there are some, else the angle where there is one.
+        What the files hold; ``auto`` takes normalised forces where there are some, else the angle where
+        there is one.
     law, degree, knots
         A table (the default: friction of the frame makes no polynomial), or a polynomial.
     interval_deg
-        Shear angles on which the law is fitted; by default all that every specimen covers, to the largest force.
+        Shear angles on which the law is fitted; by default all that every specimen covers, to the largest
+        force.
     monotone, weighting, locking, reading
         As in :func:`weftform.laboratory.bias_extension.characterise_bias_extension`.
 
@@ -117,7 +120,8 @@ def characterise_picture_frame(
 
     References
     ----------
-    Cao et al. (2008), Composites Part A 39:1037-1053: F_sh = F / (2 cos(pi/4 - gamma/2)) * L_frame / L_fabric^2.
+    Cao et al. (2008), Composites Part A 39:1037-1053: F_sh = F / (2 cos(pi/4 - gamma/2)) * L_frame /
+    L_fabric^2.
     """
     if not (np.isfinite(frame_side) and np.isfinite(fabric_side) and 0.0 < fabric_side <= frame_side):
         raise MeasurementError(

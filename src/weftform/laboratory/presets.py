@@ -1,7 +1,8 @@
 """What the columns of the usual exports are called.
 
-A preset is a set of spellings for the quantities of the laboratory and the units to take where a file gives none. The generic one
-reads any table whose headers name the quantity; the others add what an instrument calls it.
+A preset is a set of spellings for the quantities of the laboratory and the units to take where a file gives
+none. The generic one reads any table whose headers name the quantity; the others add what an instrument
+calls it.
 """
 
 from __future__ import annotations
@@ -176,11 +177,10 @@ ARAMIS = Preset(
         Quantity.MARKER: ("point id", "point name", "facet", "element"),
         Quantity.IMAGE: ("stage", "stage id"),
     },
-    {
-        q: "mm"
-        for q in (Quantity.X, Quantity.Y, Quantity.Z, Quantity.SHIFT_X, Quantity.SHIFT_Y, Quantity.SHIFT_Z)
-    }
-    | {q: "%" for q in (Quantity.STRAIN_XX, Quantity.STRAIN_YY, Quantity.STRAIN_XY)},
+    dict.fromkeys(
+        (Quantity.X, Quantity.Y, Quantity.Z, Quantity.SHIFT_X, Quantity.SHIFT_Y, Quantity.SHIFT_Z), "mm"
+    )
+    | dict.fromkeys((Quantity.STRAIN_XX, Quantity.STRAIN_YY, Quantity.STRAIN_XY), "%"),
     signs=("aramis", "gom "),
 )
 VIC3D = Preset(
@@ -196,18 +196,17 @@ VIC3D = Preset(
         Quantity.STRAIN_YY: ("eyy",),
         Quantity.STRAIN_XY: ("exy",),
     },
-    {
-        q: "mm"
-        for q in (Quantity.X, Quantity.Y, Quantity.Z, Quantity.SHIFT_X, Quantity.SHIFT_Y, Quantity.SHIFT_Z)
-    }
-    | {q: "1" for q in (Quantity.STRAIN_XX, Quantity.STRAIN_YY, Quantity.STRAIN_XY)},
+    dict.fromkeys(
+        (Quantity.X, Quantity.Y, Quantity.Z, Quantity.SHIFT_X, Quantity.SHIFT_Y, Quantity.SHIFT_Z), "mm"
+    )
+    | dict.fromkeys((Quantity.STRAIN_XX, Quantity.STRAIN_YY, Quantity.STRAIN_XY), "1"),
     signs=("exx", "vic-3d"),
 )
 PRESETS: dict[str, Preset] = {p.name: p for p in (GENERIC, INSTRON, ARAMIS, VIC3D)}
 
 
 def find_preset(name: str, words: str) -> Preset:
-    """The preset of a name; ``auto`` looks for the signs of each in ``words`` (preamble and header, small letters).
+    """The preset of a name; ``auto`` looks for the signs of each in ``words`` (in small letters).
 
     Raises
     ------

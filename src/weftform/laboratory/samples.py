@@ -1,8 +1,8 @@
-"""Sample measurements: reconstructed specimens of the paper's fabric, and the published tables of Cao et al. (2008).
+"""Sample measurements: reconstructed specimens of the paper's fabric, and tables of Cao et al. (2008).
 
-Of the paper's own tests only the equations survived. The specimens written here come from Eq. 4 (with a4 repaired, see
-the card) and Eq. 8, with scatter of a realistic size from a seeded generator. They are for learning and testing; they are
-not measurements, and every file says so.
+Of the paper's own tests only the equations survived. The specimens written here come from Eq. 4 (with a4
+repaired, see the card) and Eq. 8, with scatter of a realistic size from a seeded generator. They are for
+learning and testing; they are not measurements, and every file says so.
 """
 
 from __future__ import annotations

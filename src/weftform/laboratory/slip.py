@@ -10,8 +10,8 @@ from weftform.fabric.laws import Floats
 
 LEAST_CONFIDENCE = 0.99
 LEAST_DEPARTURE_DEG = 1.0
-"""Departure at the end of the test below which it is not called slip, whatever its significance: marker tracking and
-the idealised kinematics agree no better than that."""
+"""Departure at the end of the test below which it is not called slip, whatever its significance: marker
+tracking and the idealised kinematics agree no better than that."""
 FEWEST_POINTS = 10
 SHAPES = (("share",), ("even",), ("share", "even"), ("gradual",))
 
@@ -35,7 +35,8 @@ class SlipOnset:
     noise_deg
         Standard deviation of the measured angle about the fit [deg].
     offset_deg
-        Kinematic minus measured angle before the onset [deg]: mostly the error of the first image, which all others share.
+        Kinematic minus measured angle before the onset [deg]: mostly the error of the first image, which
+        all others share.
     """
 
     displacement: float | None
@@ -61,13 +62,14 @@ def slip_onset(
 ) -> SlipOnset:
     """Find where the measured angle falls behind the kinematic one.
 
-    The lag ``kinematic - measured`` is a constant (the angle of the first image has an error too) up to the onset ``d0``;
-    beyond it grows by a share of the further kinematic angle, by an even amount per mm, by both, or gradually with
-    ``(d - d0)^2``, whichever Bayes' information criterion prefers. A measured angle that stops, goes on at a lower share or at a lower even rate is
-    followed exactly. For each ``d0`` the rest is linear; the best ``d0`` has the least sum of squares. Against "constant
-    throughout" it is judged by an F test whose probability is multiplied by the number of onsets and shapes tried
-    (Bonferroni); the interval holds every ``d0`` that scores, with any shape, within the 95 % point of chi square of
-    the best. A gradual departure has a wide interval: its onset is not well defined.
+    The lag ``kinematic - measured`` is a constant (the angle of the first image has an error too) up to the
+    onset ``d0``; beyond it grows by a share of the further kinematic angle, by an even amount per mm, by
+    both, or gradually with ``(d - d0)^2``, whichever Bayes' information criterion prefers. A measured angle
+    that stops, goes on at a lower share or at a lower even rate is followed exactly. For each ``d0`` the
+    rest is linear; the best ``d0`` has the least sum of squares. Against "constant throughout" it is judged
+    by an F test whose probability is multiplied by the number of onsets and shapes tried (Bonferroni); the
+    interval holds every ``d0`` that scores, with any shape, within the 95 % point of chi square of the
+    best. A gradual departure has a wide interval: its onset is not well defined.
 
     Parameters
     ----------
@@ -117,7 +119,8 @@ def slip_onset(
 
 @dataclass(frozen=True, eq=False)
 class _OnsetFit:
-    """The best onset of one shape of lag: sums of squares per onset tried, and the lag gained at the end [deg]."""
+    """The best onset of one shape of lag: sums of squares per onset tried, and the lag gained at the end
+    [deg]."""
 
     onset: float
     squares: Floats

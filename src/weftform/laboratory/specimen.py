@@ -19,9 +19,11 @@ SMALL_REVERSAL = 0.01
 """Share of the travel that a displacement may step back without being an unloading."""
 CLIPPED_ROWS = 5
 CLIPPED_TRAVEL = 0.02
-"""A load cell is clipped where the largest force repeats exactly over so many rows and this share of the travel."""
+"""A load cell is clipped where the largest force repeats exactly over so many rows and this share of the
+travel."""
 LIKE_EACH_OTHER = 5.0
-"""Largest ratio between the forces of one specimen and the median specimen; beyond it units or tests are mixed."""
+"""Largest ratio between the forces of one specimen and the median specimen; beyond it units or tests are
+mixed."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class Specimen:
     file, sha256
         Where it came from.
     x, y
-        Displacement [mm] and force [N], or shear angle [deg] and normalised shear force [N/mm]; shape [n], ``x`` increasing.
+        Displacement [mm] and force [N], or shear angle [deg] and normalised shear force [N/mm]; shape [n],
+        ``x`` increasing.
     angle
         Measured shear angle [deg], shape [n], NaN where there is none; None where it was not measured.
     lines
@@ -92,7 +95,7 @@ def read_specimens(
     files: Sequence[Path | str],
     x: Quantity,
     y: Quantity,
-    reading: Reading = Reading(),  # noqa: B008 (frozen)
+    reading: Reading = Reading(),
     *,
     angle: bool = False,
 ) -> tuple[Specimen, ...]:
@@ -163,9 +166,11 @@ def _of_table(table: MeasuredTable, x: Quantity, y: Quantity, reading: Reading) 
 def clean(
     specimen: Specimen, x_name: str, y_name: str, *, zero: bool = False, guess_swapped: bool = True
 ) -> Specimen:
-    """A curve with increasing displacement and positive force, cut where the load cell is clipped or the test ends.
+    """A curve with increasing displacement and positive force, cut where the load cell is clipped or the
+    test ends.
 
-    Small steps back of the displacement are left out; a return at the end is cut off; an unloading before that is refused.
+    Small steps back of the displacement are left out; a return at the end is cut off; an unloading before
+    that is refused.
 
     Raises
     ------
@@ -210,14 +215,15 @@ def clean(
         )
     if abs(s.y[0]) > 0.05 * np.abs(s.y).max() and s.x[0] < 0.02 * s.x[-1]:
         started.append(
-            f"{s.name}: starts with {y_name} = {s.y[0]:.4g}, {100 * s.y[0] / np.abs(s.y).max():.0f} % of its largest; "
+            f"{s.name}: starts with {y_name} = {s.y[0]:.4g}, {100 * s.y[0] / np.abs(s.y).max():.0f} % of "
+            f"its largest; "
             "a preload or an untared cell (--zero removes it)"
         )
     return replace(s, warnings=(*s.warnings, *started))
 
 
 def _refuse_swapped(s: Specimen, x_name: str, y_name: str) -> None:
-    """A crosshead moves evenly and one way; a force does not. The contrary in the columns means that they are swapped."""
+    """A crosshead moves evenly and a force does not; the contrary in the columns means that they are swapped."""
 
     def unevenness(values: Floats) -> float:
         steps = np.diff(values)
@@ -302,7 +308,8 @@ def _without_clipping(s: Specimen, y_name: str) -> Specimen:
         return s
     return s.part(
         np.arange(first),
-        f"{s.name}: {y_name} stays at exactly {s.y[first]:.6g} from line {s.lines[first]} to {s.lines[last]}: a clipped "
+        f"{s.name}: {y_name} stays at exactly {s.y[first]:.6g} from line {s.lines[first]} to "
+        f"{s.lines[last]}: a clipped "
         "load cell; the curve ends before it",
     )
 

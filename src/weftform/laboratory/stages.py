@@ -10,7 +10,8 @@ import numpy as np
 from weftform.fabric.laws import Floats, Law
 
 STRAIGHT_WITHIN = 0.01
-"""The linear stage of a tensile test stays within this share of the largest force of its own straight line."""
+"""The linear stage of a tensile test stays within this share of the largest force of its own straight
+line."""
 STIFFNESS_RATIO = 10.0
 LEAST_STEEPENING = 2.0
 """Locking needs a last slope of so many times the slope before it; a curve that bends less has not locked."""
@@ -27,8 +28,8 @@ class TensileStages:
     linear_stiffness
         Slope of the linear stage [N/mm].
     damage
-        Whether the curve falls below the straight line by three tolerances later on; where it does not, the linear stage
-        is taken to the largest force.
+        Whether the curve falls below the straight line by three tolerances later on; where it does not, the
+        linear stage is taken to the largest force.
     tolerance
         Largest distance from the straight line [N]: the criterion.
     """
@@ -45,9 +46,9 @@ def tensile_stages(
 ) -> TensileStages:
     """Find the crimp, linear and damage stages of a mean tensile curve.
 
-    The linear stage is the part with the largest rise of force over which the curve stays within ``straight_within`` of the
-    largest force (or three times the noise of the mean curve, where that is more) of its own least-squares line; it ends
-    at the largest force at the latest.
+    The linear stage is the part with the largest rise of force over which the curve stays within
+    ``straight_within`` of the largest force (or three times the noise of the mean curve, where that is
+    more) of its own least-squares line; it ends at the largest force at the latest.
 
     Parameters
     ----------
@@ -88,7 +89,8 @@ class LockingCriterion(Enum):
     """How the locking angle is found."""
 
     BROKEN_LINE = "broken-line"
-    """Second knot of the best continuous line of three straight parts; it depends on how far the test went."""
+    """Second knot of the best continuous line of three straight parts; it depends on how far the test
+    went."""
     STIFFNESS_RATIO = "stiffness-ratio"
     """Where dF_sh/dgamma reaches a multiple of the mean stiffness over the first ten degrees, for good."""
 
@@ -125,8 +127,8 @@ def shear_stages(
     """The three stages of a fitted F_sh(gamma) over its measured range.
 
     The two knots of the broken line minimise the sum of squares, each part at least 5 % of the range. With
-    ``BROKEN_LINE`` the locking angle is the second knot, where the tangents of transition and locking meet, provided that
-    the last part is at least twice as steep as the one before.
+    ``BROKEN_LINE`` the locking angle is the second knot, where the tangents of transition and locking meet,
+    provided that the last part is at least twice as steep as the one before.
 
     Parameters
     ----------
@@ -153,7 +155,8 @@ def shear_stages(
         steep = slopes[2] >= LEAST_STEEPENING * max(slopes[1], 0.0) and slopes[2] > 0.0
         locking = second if steep else None
         words = (
-            f"second knot of the best three-part broken line of F_sh over 0-{span:.3g} deg, if the last part is at least "
+            f"second knot of the best three-part broken line of F_sh over 0-{span:.3g} deg, if the last "
+            f"part is at least "
             f"{LEAST_STEEPENING:g} times as steep as the one before"
         )
     else:
@@ -163,7 +166,8 @@ def shear_stages(
         start = int(below[-1]) + 1 if below.size else 0
         locking = float(x[start]) if start < len(x) else None
         words = (
-            f"dF_sh/dgamma stays above {stiffness_ratio:g} times its mean over 0-{np.degrees(early):.3g} deg, "
+            f"dF_sh/dgamma stays above {stiffness_ratio:g} times its mean over 0-{np.degrees(early):.3g} "
+            f"deg, "
             f"seen over 0-{span:.3g} deg"
         )
     return ShearStages(first, locking, slopes, words)
@@ -172,7 +176,7 @@ def shear_stages(
 def _best_broken_line(
     x: Floats, y: Floats, firsts: Floats, seconds: Floats
 ) -> tuple[float, float, float, Floats]:
-    """Sum of squares, the two knots and the coefficients of the best continuous line of three straight parts."""
+    """Sum of squares, knots and coefficients of the best continuous line of three straight parts."""
     best: tuple[float, float, float, Floats] | None = None
     apart = 0.05 * float(x[-1] - x[0])
     for first in firsts:

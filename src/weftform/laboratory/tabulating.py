@@ -1,4 +1,4 @@
-"""Tabulated laws: a rising table fitted over all points of all specimens, as an alternative to a polynomial."""
+"""Tabulated laws: a rising table fitted over all points of all specimens."""
 
 from __future__ import annotations
 
@@ -49,10 +49,11 @@ class TableFit:
 def fit_table(
     xs: Sequence[Floats], responses: Sequence[Floats], design: Design, valid_to: float, *, knots: int = 24
 ) -> TableFit:
-    """Fit a continuous, piecewise straight, rising curve with so many knots, then drop the knots where it is level.
+    """Fit a continuous, piecewise straight, rising curve with so many knots, then drop the knots where it
+    is level.
 
-    The unknowns are the increments from knot to knot, none negative: non-negative least squares, with every specimen of
-    the same weight. Knots are spread so that as many points lie between any two.
+    The unknowns are the increments from knot to knot, none negative: non-negative least squares, with every
+    specimen of the same weight. Knots are spread so that as many points lie between any two.
 
     Raises
     ------
@@ -85,7 +86,8 @@ def fit_table(
         raise MeasurementError("the curve does not rise, so no law fits it")
     values = np.append(0.0, np.cumsum(steps))
     rises = steps > 1e-6 * total
-    # Of a level stretch only its end is kept, so that the table rises strictly; the end of the range always stays.
+    # Of a level stretch only its end is kept, so that the table rises strictly; the end of the range always
+    # stays.
     rises[-1] = True
     x_law, y_law = np.append(0.0, places[1:][rises]), np.append(0.0, values[1:][rises])
     if y_law[-1] <= y_law[-2]:
@@ -109,8 +111,8 @@ def fit_table(
 def _without_rounding(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Points whose monotone cubic rises to the last bit.
 
-    At either end its slope may be nought, and rounding then makes it negative by 1e-17, which a card refuses; the point next
-    to that end is left out instead.
+    At either end its slope may be nought, and rounding then makes it negative by 1e-17, which a card
+    refuses; the point next to that end is left out instead.
     """
     while len(x) > 3:
         fall = first_fall(TabulatedLaw(tuple(map(float, x)), tuple(map(float, y))), float(x[-1]))

@@ -1,4 +1,5 @@
-"""Tensile tests along the yarns: from specimens to the tension law of a direction (Sec. 2.2, 2.4.1, Eqs. 3, 4 and 11)."""
+"""Tensile tests along the yarns: from specimens to the tension law of a direction (Sec. 2.2, 2.4.1, Eqs. 3,
+4 and 11)."""
 
 from __future__ import annotations
 
@@ -70,7 +71,7 @@ class TensileCharacterisation:
         return self.fit.band(displacement, level=level, simultaneous=simultaneous)
 
     def connector_limits(self, spacing: float) -> tuple[float, float]:
-        """Uc_max [mm] and Fc_max [N] of a connector in a mesh of ``spacing`` l0 [mm], at the end of validity (Eq. 11)."""
+        """Uc_max [mm] and Fc_max [N] of a connector at the end of validity, for l0 = ``spacing`` [mm] (Eq. 11)."""
         end = self.fit.valid_to
         return end * spacing / self.length, float(self.law.value(end)) / (self.width / spacing + 1.0)
 
@@ -155,12 +156,14 @@ def characterise_tensile(
     for s in specimens:
         if s.x[-1] > LARGEST_STRAIN * length:
             raise MeasurementError(
-                f"{s.name}: an elongation of {s.x[-1]:.4g} mm is not one of a {length:g} mm specimen along its yarns",
+                f"{s.name}: an elongation of {s.x[-1]:.4g} mm is not one of a {length:g} mm specimen along "
+                f"its yarns",
                 file=s.file,
                 line=int(s.lines[np.argmax(s.x > LARGEST_STRAIN * length)]),
                 expected=f"at most {LARGEST_STRAIN * length:g} mm",
                 got=f"{s.x[-1]:.6g} mm",
-                hint="are displacement and force swapped, or the units wrong? --column displacement=..., --unit ...",
+                hint="are displacement and force swapped, or the units wrong? --column displacement=..., "
+                "--unit ...",
             )
     warnings = [w for s in specimens for w in s.warnings]
     mean = average(specimens)
@@ -187,7 +190,8 @@ def characterise_tensile(
         end = min(end, reached)
     elif end > 1.001 * reached:
         warnings.append(
-            f"the interval asked for ends at {end:.4g} mm, the measurements at {reached:.4g} mm; validity ends there"
+            f"the interval asked for ends at {end:.4g} mm, the measurements at {reached:.4g} mm; validity "
+            f"ends there"
         )
         end = reached
     fit: PolynomialFit | TableFit
@@ -222,13 +226,15 @@ def fit_warnings(fit: PolynomialFit, x_unit: str, y_unit: str, x_factor: float =
     warnings = []
     if fit.constrained:
         warnings.append(
-            f"the best polynomial of degree {fit.powers[-1]} falls somewhere in its validity; the best rising one is used "
+            f"the best polynomial of degree {fit.powers[-1]} falls somewhere in its validity; the best "
+            f"rising one is used "
             f"(rms {fit.rms:.4g} {y_unit})"
         )
     fall = first_fall(fit.law(), fit.valid_to)
     if fall is not None:
         warnings.append(
-            f"the fit is not monotone: it falls between {fall.start * x_factor:.3g} and {fall.end * x_factor:.3g} {x_unit}; "
+            f"the fit is not monotone: it falls between {fall.start * x_factor:.3g} and "
+            f"{fall.end * x_factor:.3g} {x_unit}; "
             "a card with it is refused"
         )
     if fit.constant != 0.0:

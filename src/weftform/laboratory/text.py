@@ -1,4 +1,5 @@
-"""From the bytes of an export to cells: encoding, delimiter, decimal mark. No meaning is given to a column here."""
+"""From the bytes of an export to cells: encoding, delimiter, decimal mark. No meaning is given to a column
+here."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ class CutText:
 
 
 def decode(raw: bytes, file: Path) -> tuple[str, str]:
-    """Text and encoding of a file: byte order mark first, then UTF-8, then windows-1252 (any Western machine).
+    """Text and encoding of a file: byte order mark first, then UTF-8, then windows-1252 (any Western
+    machine).
 
     Raises
     ------
@@ -107,7 +109,8 @@ def read_bytes(file: Path) -> bytes:
 def cut(file: Path) -> CutText:
     """Read a file and cut it into cells.
 
-    The delimiter is the one that gives the same number of cells on most lines, more than one; white space where none does.
+    The delimiter is the one that gives the same number of cells on most lines, more than one; white space
+    where none does.
     """
     raw = read_bytes(file)
     text, encoding = decode(raw, file)

@@ -63,9 +63,11 @@ def _normal(unit: str) -> str:
 
 
 def unit_factor(unit: str, dimension: Dimension) -> float | None:
-    """Factor from ``unit`` to the laboratory's unit of ``dimension``; None where the unit is not one of that kind.
+    """Factor from ``unit`` to the laboratory's unit of ``dimension``; None where the unit is not one of
+    that kind.
 
-    The capitals matter only where they change the meaning: ``mN`` and ``MN`` differ, ``MM`` and ``mm`` do not.
+    The capitals matter only where they change the meaning: ``mN`` and ``MN`` differ, ``MM`` and ``mm`` do
+    not.
     """
     known = _FACTORS[dimension]
     name = _normal(unit)
