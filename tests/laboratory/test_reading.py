@@ -121,8 +121,9 @@ def test_thousands_marks() -> None:
     assert number("1.234,5", True) == 1234.5
     assert number("-1.5e-3", False) == -1.5e-3
     assert number("n/a", False) is None
-    with pytest.raises(ValueError):
-        number("1.2.3", False)
+    for bad in ("1.2.3", "1e400", "12 N", "0x10"):
+        with pytest.raises(ValueError):
+            number(bad, False)
 
 
 @given(st.floats(-1e6, 1e6, allow_nan=False), st.booleans())

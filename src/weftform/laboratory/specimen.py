@@ -223,7 +223,7 @@ def clean(
 
 
 def _refuse_swapped(s: Specimen, x_name: str, y_name: str) -> None:
-    """A crosshead moves evenly and a force does not; the contrary in the columns means that they are swapped."""
+    """A crosshead moves evenly, a force does not; the contrary means that the columns are swapped."""
 
     def unevenness(values: Floats) -> float:
         steps = np.diff(values)

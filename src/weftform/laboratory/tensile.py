@@ -71,7 +71,7 @@ class TensileCharacterisation:
         return self.fit.band(displacement, level=level, simultaneous=simultaneous)
 
     def connector_limits(self, spacing: float) -> tuple[float, float]:
-        """Uc_max [mm] and Fc_max [N] of a connector at the end of validity, for l0 = ``spacing`` [mm] (Eq. 11)."""
+        """Uc_max [mm] and Fc_max [N] at the end of validity for a mesh of l0 = ``spacing`` mm (Eq. 11)."""
         end = self.fit.valid_to
         return end * spacing / self.length, float(self.law.value(end)) / (self.width / spacing + 1.0)
 

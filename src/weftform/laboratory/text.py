@@ -1,10 +1,10 @@
-"""From the bytes of an export to cells: encoding, delimiter, decimal mark. No meaning is given to a column
-here."""
+"""From the bytes of an export to cells: encoding, delimiter, decimal mark; columns have no meaning here."""
 
 from __future__ import annotations
 
 import csv
 import hashlib
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,8 +133,14 @@ def cut(file: Path) -> CutText:
 def _cells(line: str, delimiter: str) -> tuple[str, ...]:
     if delimiter == " ":
         return tuple(line.split())
-    cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
-    return tuple(cells)
+    try:
+        return tuple(
+            cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+        )
+    except (
+        csv.Error
+    ):  # a cell of more than 128 kB: no table has one, so the line is left whole and found unreadable
+        return (line.strip(),)
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -195,4 +201,7 @@ def number(cell: str, decimal_comma: bool) -> float | None:
     text = text.replace(thousands, "")
     if text.count(mark) > 1:
         raise ValueError(cell)
-    return float(text.replace(mark, "."))
+    value = float(text.replace(mark, "."))
+    if not math.isfinite(value):
+        raise ValueError(cell)
+    return value
