@@ -227,7 +227,7 @@ def test_none_of_the_specimens_asked_for() -> None:
 
 
 def test_damaged_files_end_in_a_result_or_a_measurement_error(tmp_path) -> None:
-    """Bytes changed, cut out and put in at random: never another exception, never a law that is not finite."""
+    """Bytes changed, cut out and put in at random: no other exception, no law that is not finite."""
     import random
 
     from weftform.laboratory import sample
