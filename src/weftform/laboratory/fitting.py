@@ -56,6 +56,9 @@ class PolynomialFit:
         Of ``free_coefficients``, shape [p, p].
     deviations
         Of the coefficients of each specimen from the mean, shape [specimens, p]; empty for one specimen.
+    within
+        Covariance that the noise about the curve of each specimen gives by itself, shape [p, p]: the true
+        covariance is no smaller, whatever few specimens say.
     shared
         Errors of the coefficients that all specimens share, drawn at random, shape [draws, p]; part of
         ``covariance``.
@@ -78,6 +81,7 @@ class PolynomialFit:
     free_coefficients: Floats
     covariance: Floats
     deviations: Floats
+    within: Floats
     shared: Floats
     valid_to: float
     specimens: int
@@ -137,7 +141,12 @@ class PolynomialFit:
         x = np.atleast_1d(np.asarray(x, float))
         basis = self.basis(x, kind)
         free = basis @ self.free_coefficients
-        error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", basis, self.covariance, basis), 0.0))
+        common = self.shared @ basis.T / np.sqrt(max(len(self.shared), 1))
+        scatter, noise = (
+            np.einsum("ij,jk,ik->i", basis, c, basis)
+            for c in (self.covariance - self.shared.T @ self.shared / max(len(self.shared), 1), self.within)
+        )
+        error = np.sqrt(np.maximum(np.maximum(scatter, noise), 0.0) + (common**2).sum(axis=0))
         key = (kind, level, simultaneous, x.tobytes())
         if key not in self._critical:
             self._critical[key] = (
@@ -156,13 +165,19 @@ class PolynomialFit:
         rng = np.random.default_rng(0)
         if self.specimens > 1:
             n = self.specimens
-            curves = self.deviations @ basis.T / np.sqrt(n - 1)  # [n, m], covariance of one specimen
-            used = np.linalg.norm(curves, axis=0) > 1e-12 * max(
-                float(np.linalg.norm(curves, axis=0).max()), 1e-300
-            )
+            # Roots of the covariance of one specimen: between specimens (few, so of low rank) and noise (of
+            # full rank). Together they are rather too large than too small, so the band errs on the safe
+            # side.
+            scale, turn = np.linalg.eigh(n * self.within)
+            between = self.deviations @ basis.T / np.sqrt(n - 1)
+            noise = (turn * np.sqrt(np.maximum(scale, 0.0))).T @ basis.T
+            floor = (noise**2).sum(axis=0)
+            size = np.maximum((between**2).sum(axis=0), floor)
+            used = size > 1e-24 * max(float(size.max()), 1e-300)
             if not used.any():
                 return _student(level, self.freedom)
-            draws = rng.standard_normal((SIMULATIONS, n, n)) @ curves[:, used]
+            curves = np.vstack([between, noise])[:, used]
+            draws = rng.standard_normal((SIMULATIONS, n, len(curves))) @ curves
             error, variance = draws.mean(axis=1), draws.var(axis=1, ddof=1) / n
             if len(self.shared):
                 common = self.shared @ basis.T[:, used] / np.sqrt(len(self.shared))
@@ -266,16 +281,17 @@ def fit_polynomial(
         rows, values = _weighted(designs, responses, weights, scale)
         free = np.linalg.lstsq(np.vstack(rows), np.concatenate(values), rcond=None)[0]
     a, y = np.vstack(rows), np.concatenate(values)
-    bread = np.linalg.inv(a.T @ a)
+    bread: Floats = np.asarray(np.linalg.inv(a.T @ a), float)
     if n > 1:
         deviations = np.array([n * bread @ r.T @ (v - r @ free) for r, v in zip(rows, values, strict=True)])
         covariance = deviations.T @ deviations / (n * (n - 1))
+        within = _noise(rows, values, free, deviations, bread)
         freedom = n - 1
     else:
         residual = y - a @ free
         freedom = points - p
         covariance = bread * float(residual @ residual) / freedom * _inflation(residual)
-        deviations = np.empty((0, p))
+        deviations, within = np.empty((0, p)), covariance
     shared = np.empty((len(designs_again), p))
     for k, again in enumerate(designs_again):
         rows_again, _ = _weighted(again, responses, weights, scale)
@@ -294,6 +310,7 @@ def fit_polynomial(
         free_coefficients=free / scale,
         covariance=covariance / np.outer(scale, scale),
         deviations=deviations / scale,
+        within=within / np.outer(scale, scale),
         shared=shared / scale,
         valid_to=float(valid_to),
         specimens=n,
@@ -311,6 +328,19 @@ def _weighted(
     """Rows and values of the least-squares problem, per specimen, for scaled coefficients."""
     rows = [d / scale * w[:, None] for d, w in zip(designs, weights, strict=True)]
     return rows, [r * w for r, w in zip(responses, weights, strict=True)]
+
+
+def _noise(
+    rows: list[Floats], values: list[Floats], free: Floats, deviations: Floats, bread: Floats
+) -> Floats:
+    """Covariance of the mean from the residuals about each specimen's own curve, of any size along it."""
+    p = len(free)
+    middle = np.zeros((p, p))
+    for row, value, own in zip(rows, values, deviations, strict=True):
+        rest = value - row @ (free + own)
+        score = row * rest[:, None]
+        middle += score.T @ score * len(rest) / max(len(rest) - p, 1) * _inflation(rest)
+    return np.asarray(bread @ middle @ bread)
 
 
 def _inflation(residual: Floats) -> float:
