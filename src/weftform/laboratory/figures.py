@@ -186,7 +186,7 @@ def _shear(
     )
     axes.plot(angle, shear.stress(angle), color=LAW, lw=2, label="shear stress (left)")
     axes.plot(angle, shear.modulus(angle), color=SECOND, lw=2, label="shear modulus (left)")
-    _shade(axes, angle, shear.modulus_band(angle), SECOND)
+    _shade(axes, angle, shear.modulus_band(angle), SECOND, "modulus")
     right = axes.twinx()
     right.plot(
         angle,
@@ -247,7 +247,7 @@ def _mean(axes: Axes, x: Floats, mean: Floats, deviation: Floats) -> None:
         )
 
 
-def _shade(axes: Axes, x: Floats, band: Band | None, colour: str = LAW) -> None:
+def _shade(axes: Axes, x: Floats, band: Band | None, colour: str = LAW, what: str = "law") -> None:
     if band is not None:
         axes.fill_between(
             x, band.lower, band.upper, color=colour, alpha=0.2, lw=0, label="95 % band of the law"
