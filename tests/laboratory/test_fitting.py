@@ -11,7 +11,7 @@ from scipy.integrate import trapezoid
 
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import first_fall
-from weftform.laboratory.fitting import fit_polynomial, power_basis
+from weftform.laboratory.fitting import fit_polynomial
 from weftform.laboratory.kinematics import (
     bias_design,
     bias_force,
@@ -21,6 +21,7 @@ from weftform.laboratory.kinematics import (
     kinematic_displacement,
     kinematic_limit,
 )
+from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.samples import SHEAR, TENSILE
 from weftform.laboratory.tabulating import fit_table
 

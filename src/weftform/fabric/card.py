@@ -55,9 +55,7 @@ class TensionTable(Declared):
                 raise ValueError("give either same_as or law, not both")
             return self
         if self.law is None:
-            raise ValueError(
-                'law is missing (polynomial, linear, log-strain or tabulated), or same_as = "warp"'
-            )
+            raise ValueError('law is missing (polynomial, linear, log-strain or tabulated), or same_as = "warp"')
         needed = {
             "polynomial": ("coefficients", "valid_to_mm"),
             "linear": ("stiffness_N_per_mm",),

@@ -34,9 +34,7 @@ MOST_STRETCH = 2.0
 def shipped_cards() -> dict[str, Path]:
     """Names and files of the cards in the package."""
     folder = resources.files("weftform") / "data" / "cards"
-    return {
-        p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)
-    }
+    return {p.name.removesuffix(".toml"): Path(str(p)) for p in sorted(folder.iterdir(), key=lambda p: p.name)}
 
 
 @dataclass(frozen=True)
@@ -116,12 +114,7 @@ class Fabric:
 
     @classmethod
     def load(
-        cls,
-        card: str | Path,
-        *,
-        variant: str = "",
-        override: Mapping[str, Any] | None = None,
-        near: Path | None = None,
+        cls, card: str | Path, *, variant: str = "", override: Mapping[str, Any] | None = None, near: Path | None = None
     ) -> Fabric:
         """Read a card by shipped name or file.
 

@@ -70,9 +70,7 @@ def pack_law(law: Law, end: float) -> PiecewiseLaw:
     if isinstance(inner, LinearLaw):
         return pack_polynomial(np.array([0.0, scale_x * scale_y * inner.stiffness]), end)
     if isinstance(inner, PolynomialLaw):
-        powers = np.array([inner.constant, *inner.coefficients]) * scale_x ** np.arange(
-            len(inner.coefficients) + 1
-        )
+        powers = np.array([inner.constant, *inner.coefficients]) * scale_x ** np.arange(len(inner.coefficients) + 1)
         return pack_polynomial(scale_y * powers, inner.valid_to / scale_x)
     from scipy.interpolate import CubicHermiteSpline
 

@@ -12,7 +12,7 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats
 from weftform.laboratory.averaging import MeanCurve, average
-from weftform.laboratory.fitting import PolynomialFit, Weighting, fit_polynomial, power_basis
+from weftform.laboratory.fitting import PolynomialFit, Weighting, fit_polynomial
 from weftform.laboratory.kinematics import (
     bias_design,
     check_bias_specimen,
@@ -22,6 +22,7 @@ from weftform.laboratory.kinematics import (
 )
 from weftform.laboratory.markers import MarkerTracking
 from weftform.laboratory.measured_angle import MeasuredAngle
+from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.shear import ShearCurve
 from weftform.laboratory.slip import SlipOnset, slip_onset

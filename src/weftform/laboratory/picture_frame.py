@@ -12,8 +12,9 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats
 from weftform.laboratory.averaging import MeanCurve, average
-from weftform.laboratory.fitting import PolynomialFit, Weighting, fit_polynomial, power_basis
+from weftform.laboratory.fitting import PolynomialFit, Weighting, fit_polynomial
 from weftform.laboratory.kinematics import frame_angle, frame_lever, frame_limit
+from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.shear import ShearCurve
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens

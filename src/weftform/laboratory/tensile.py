@@ -14,7 +14,8 @@ from weftform.errors import MeasurementError
 from weftform.fabric.fabric import Direction
 from weftform.fabric.laws import Floats, Law, first_fall
 from weftform.laboratory.averaging import MeanCurve, average
-from weftform.laboratory.fitting import Band, PolynomialFit, Weighting, fit_polynomial, power_basis
+from weftform.laboratory.fitting import Band, PolynomialFit, Weighting, fit_polynomial
+from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
 from weftform.laboratory.stages import TensileStages, tensile_stages

@@ -37,9 +37,7 @@ def rounded_edge(
 
 
 @scalar
-def coulomb(
-    trial_x: float, trial_y: float, trial_z: float, limit: float
-) -> tuple[float, float, float, float]:
+def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
     """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
 
     Returns the three components and the excess that was cut off [N]: excess / tangential stiffness is the slip.

@@ -40,9 +40,7 @@ def shear_angle(g11: float, g22: float, g12: float) -> float:
 
 
 @scalar
-def shear_stress(
-    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float
-) -> float:
+def shear_stress(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, t: float) -> float:
     """``tau`` [MPa] as a law in ``t = tan(gamma / 2)``, odd in ``t``. The fitted polynomial is of ``tau / t``."""
     size = abs(t)
     return odd(size * piecewise_value(coefficients, degree, pieces, width, end_slope, size), t)

@@ -22,9 +22,7 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 
 
 @scalar
-def piecewise_value(
-    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
-) -> float:
+def piecewise_value(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float) -> float:
     """Value at ``x >= 0`` of a law with ``pieces`` polynomials of equal ``width``, linear beyond the last."""
     end = width * pieces
     inside = min(x, end)
@@ -36,9 +34,7 @@ def piecewise_value(
 
 
 @scalar
-def piecewise_slope(
-    coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float
-) -> float:
+def piecewise_slope(coefficients: Any, degree: int, pieces: int, width: float, end_slope: float, x: float) -> float:
     """Derivative of :func:`piecewise_value`."""
     end = width * pieces
     if x >= end:
