@@ -81,7 +81,7 @@ def threads_for(cells: int, wanted: int | None) -> int:
     """
     import numba
 
-    most = int(numba.config.NUMBA_NUM_THREADS)
+    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     if wanted is None:
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         return max(1, min(available, most, cells // CELLS_PER_THREAD))
@@ -345,7 +345,7 @@ class Run:
             "progress": np.array([stop, self.peak_penetration, self.wall]),
         }
         temporary = self.out / "checkpoint.part.npz"
-        np.savez(temporary, **state, **extra)
+        np.savez(temporary, allow_pickle=False, **state, **extra)
         os.replace(temporary, self.out / "checkpoint.npz")
         self._checkpointed = time.monotonic()
 

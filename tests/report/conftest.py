@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from weftform import Result, Study
-from weftform.execution import HISTORY, blank_summary
+from weftform.cases import case_of
+from weftform.execution import COLUMNS, blank_summary
 from weftform.result.fields import Fields
 from weftform.result.outline import draw_in, formed_outline
 from weftform.result.writer import ResultWriter, claim_folder, write_whole
@@ -32,9 +33,10 @@ def lay_down(name, folder) -> Result:
     def fields(share):
         return Fields(grid, study.fabric, bumped(grid.flat, share))
 
-    writer = ResultWriter(folder, HISTORY, fields(0.0))
+    columns = [*COLUMNS, *case_of(study).columns]
+    writer = ResultWriter(folder, columns, fields(0.0))
     for share in np.linspace(0.0, 1.0, 11):
-        row = dict.fromkeys(HISTORY, 0.0)
+        row = dict.fromkeys(columns, 0.0)
         energies = {
             "internal": 40.0,
             "friction": 900.0,

@@ -1,7 +1,8 @@
 """The yarn grid: a window on a structured grid of yarn crossings.
 
-Mesh lines are yarns. Index ``i`` counts crossings along a warp yarn, ``j`` along a weft yarn; arrays are indexed ``[j, i]``. An
-outline or a plane of symmetry that runs along the bias is met by half cells: right triangles, one corner missing.
+Mesh lines are yarns. Index ``i`` counts crossings along a warp yarn, ``j`` along a weft yarn; arrays are indexed
+``[j, i]``. An outline or a plane of symmetry that runs along the bias is met by half cells: right triangles, one
+corner missing.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -103,7 +105,7 @@ class YarnGrid:
     @property
     def copies(self) -> int:
         """How many times the modelled part makes up the blank: 1, 2 or 4."""
-        return 2 ** len(self.planes)
+        return int(2 ** len(self.planes))
 
     @cached_property
     def axes(self) -> tuple[float, float]:
@@ -124,7 +126,9 @@ class YarnGrid:
 
     @cached_property
     def material(self) -> Floats:
-        """Yarn coordinates (U along warp, V along weft) of the crossings from the centre [mm], shape [rows, columns, 2]."""
+        """Yarn coordinates (U along warp, V along weft) of the crossings from the centre [mm], shape [rows,
+        columns, 2].
+        """
         rows, columns = self.shape
         u = (np.arange(columns) - self.centre[0]) * self.warp_pitch
         v = (np.arange(rows) - self.centre[1]) * self.weft_pitch
@@ -163,7 +167,7 @@ class YarnGrid:
     @cached_property
     def active(self) -> NDArray[np.bool_]:
         """Crossings that belong to the blank, shape [rows, columns]."""
-        return self.node_area > 0.0
+        return np.asarray(self.node_area > 0.0)
 
     def _legs(self, first: int, second: int) -> NDArray[np.bool_]:
         """Cells that have the edge between two neighbouring corners."""
@@ -171,7 +175,7 @@ class YarnGrid:
         for kind, lacked in LACKED.items():
             if lacked in (first, second):
                 has = has & (self.cells != kind)
-        return has
+        return np.asarray(has)
 
     @cached_property
     def warp_lines(self) -> Floats:
@@ -197,11 +201,13 @@ class YarnGrid:
     def on_plane(self) -> NDArray[np.bool_]:
         """Whether each crossing lies on the planes x = 0, y = 0 of symmetry, shape [rows, columns, 2]."""
         near = np.abs(self.flat[..., :2]) < 1e-6 * min(self.warp_pitch, self.weft_pitch)
-        return near & np.array([plane in self.planes for plane in ("x", "y")])
+        return np.asarray(near & np.array([plane in self.planes for plane in ("x", "y")]))
 
     @cached_property
     def edge_weights(self) -> tuple[Floats, Floats]:
-        """Share of the lower warp edge and of the left weft edge in a cell's yarn vectors (0.5 each in a whole cell)."""
+        """Share of the lower warp edge and of the left weft edge in a cell's yarn vectors (0.5 each in a whole
+        cell).
+        """
         lower = np.full(self.cells.shape, 0.5)
         left = np.full(self.cells.shape, 0.5)
         for kind, low, lef in (
@@ -232,8 +238,8 @@ class YarnGrid:
         """Edge of the modelled part as chains of flat node indices, without the planes of symmetry, longest first."""
         indices, offsets, _ = self.quads
         following: dict[int, list[int]] = {}
-        edges = set()
-        for a, b in zip(offsets[:-1], offsets[1:], strict=True):
+        edges: set[tuple[int, int]] = set()
+        for a, b in pairwise(offsets):
             ring = indices[a:b]
             edges.update((int(p), int(q)) for p, q in zip(ring, np.roll(ring, -1), strict=True))
         on = self.on_plane.reshape(-1, 2)
@@ -322,8 +328,8 @@ def build_grid(
     along = across = cell_length
     centre = (0.0, 0.0)
     if fitted and aligned and not along_bias:
-        count_u, along = shapes.fit_along_yarns(u1 - u0, cell_length, bool(planes))
-        count_v, across = shapes.fit_along_yarns(v1 - v0, cell_length, bool(planes))
+        _, along = shapes.fit_along_yarns(u1 - u0, cell_length, bool(planes))
+        _, across = shapes.fit_along_yarns(v1 - v0, cell_length, bool(planes))
         # The first line lies on the edge of the outline, so the centre of the press may lie between crossings.
         centre = (-u0 / along, -v0 / across)
     elif fitted and along_bias:
@@ -357,7 +363,7 @@ def build_grid(
     if not cells.any():
         _no_cell(cell_length)
     if np.count_nonzero(cells) > LARGEST_GRID:
-        _too_many(np.count_nonzero(cells))
+        _too_many(float(np.count_nonzero(cells)))
     rows_used = np.flatnonzero(cells.any(axis=1))
     columns_used = np.flatnonzero(cells.any(axis=0))
     j0, i0 = int(rows_used[0]), int(columns_used[0])

@@ -50,8 +50,9 @@ def fit_along_yarns(length: float, target: float, even: bool) -> tuple[int, floa
 def fit_along_bias(width: float, height: float, target: float, even: bool) -> float:
     """Cell length [mm] near ``target`` for which both sides of a rectangle run along cell diagonals.
 
-    A side of length ``L`` spans ``n`` diagonals of ``sqrt(2) l0``, and both counts must be whole. Where width and height have no such
-    common measure within 15 % of the target, the length that misses the sides by least is returned.
+    A side of length ``L`` spans ``n`` diagonals of ``sqrt(2) l0``, and both counts must be whole. Where width and
+    height have no such common measure within 15 % of the target, the length that misses the sides by least is
+    returned.
     """
     step = 2 if even else 1
     best = (math.inf, math.inf, target)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from weftform.blank import YarnGrid
 from weftform.cases.case import Case, Row
 from weftform.cases.clamps import clamped, ends
-from weftform.laboratory.kinematics import bias_shear_angle, kinematic_end, normalised_shear_force
+from weftform.laboratory.kinematics import kinematic_angle, kinematic_limit
+from weftform.laboratory.point_by_point import normalised_shear_force
 from weftform.result.fields import Fields
 from weftform.solver import Motion, Problem, Simulation
 from weftform.study.schema import BiasModel
@@ -129,7 +130,7 @@ class BiasExtension(Case):
         row = {f"shear_angle_zone_{name}_deg": self._mean(angle, name) for name in self._masks}
         row["shear_angle_centre_deg"] = float(np.degrees(angle[self._central].mean()))
         row["shear_angle_kinematic_deg"] = float(
-            np.degrees(bias_shear_angle(self.displacement(simulation), self.height, self.width))
+            np.degrees(kinematic_angle(self.displacement(simulation), self.height, self.width))
         )
         row["width_mm"] = float(positions[right, 0].mean() - positions[left, 0].mean())
         return row
@@ -142,7 +143,7 @@ class BiasExtension(Case):
         return {
             "force_N": final["force_N"],
             "displacement_mm": final["displacement_mm"],
-            "kinematic_end_mm": kinematic_end(self.height, self.width),
+            "kinematic_end_mm": kinematic_limit(self.height, self.width),
             **{name: final[name] for name in self.columns},
             "normalised_shear_force": {
                 "shear_angle_deg": [float(a) for a in np.degrees(angle)],
@@ -152,7 +153,7 @@ class BiasExtension(Case):
         }
 
     def warnings(self) -> list[str]:
-        end = kinematic_end(self.height, self.width)
+        end = kinematic_limit(self.height, self.width)
         wanted = self.model.loading.displacement_mm
         if wanted > end:
             return [

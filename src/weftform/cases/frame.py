@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weftform.cases.case import Case, Row
-from weftform.laboratory.kinematics import normalised_frame_force
+from weftform.laboratory.kinematics import frame_lever
 from weftform.result.fields import Fields
 from weftform.solver import Driven, Motion, Problem, Simulation
 from weftform.solver.loop import COSINE, SINE
@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 class PictureFrame(Case):
     """Every crossing on the edge follows the frame; with several angles the shear is cyclic.
 
-    The sides of the fabric turn by half the shear angle ``a`` towards each other: a material point (U, V) of the edge goes to
-    ``U (cos a, sin a) + V (sin a, cos a)``.
+    The sides of the fabric turn by half the shear angle ``a`` towards each other: a material point (U, V) of the
+    edge goes to ``U (cos a, sin a) + V (sin a, cos a)``.
     """
 
     columns = ("shear_angle_frame_deg", "normalised_shear_force_N_per_mm", "shear_angle_mean_deg")
@@ -71,7 +71,7 @@ class PictureFrame(Case):
         turning = -np.sin(half) * self.modes[0] + np.cos(half) * self.modes[1]
         torque = 0.5 * float((simulation.driven_forces * turning).sum())
         phi = 0.25 * np.pi - half
-        return torque / (self.model.specimen.frame_side_mm * np.sin(phi))
+        return float(torque / (self.model.specimen.frame_side_mm * np.sin(phi)))
 
     def row(self, simulation: Simulation, fields: Fields, force: float) -> Row:
         angle = self._angle(simulation)
@@ -79,7 +79,7 @@ class PictureFrame(Case):
         return {
             "shear_angle_frame_deg": float(np.degrees(angle)),
             "normalised_shear_force_N_per_mm": float(
-                normalised_frame_force(angle, force, specimen.frame_side_mm, specimen.fabric_side_mm)
+                force / frame_lever(np.asarray(angle), specimen.frame_side_mm, specimen.fabric_side_mm)
             ),
             "shear_angle_mean_deg": float(np.degrees(np.nanmean(fields.shear_angle))),
         }

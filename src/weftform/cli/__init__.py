@@ -7,6 +7,7 @@ import sys
 import typer
 
 from weftform.cli.bodies import VERBS
+from weftform.cli.characterise import app as characterise
 from weftform.errors import WeftformError
 
 app = typer.Typer(
@@ -21,6 +22,7 @@ app = typer.Typer(
 
 for name, body in VERBS.items():
     app.command(name)(body)
+app.add_typer(characterise, name="characterise")
 
 
 def main() -> None:

@@ -12,11 +12,13 @@ from weftform.cli.new import new
 from weftform.cli.probe import probe
 from weftform.cli.run import run
 from weftform.cli.studies import studies
+from weftform.cli.view import view
 
 VERBS: dict[str, Callable[..., Any]] = {
     "new": new,
     "check": check,
     "run": run,
+    "view": view,
     "probe": probe,
     "studies": studies,
     "cards": cards,

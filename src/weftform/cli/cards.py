@@ -23,7 +23,8 @@ def cards(
 ) -> None:
     """List the shipped fabric cards, or show one.
 
-    Examples: weftform cards; weftform cards hexforce-48600-c1300; weftform cards hexforce-48600-c1300 --copy-to mine.toml
+    Examples: weftform cards; weftform cards hexforce-48600-c1300; weftform cards hexforce-48600-c1300 --copy-to
+    mine.toml
     """
     from weftform.errors import CardError
     from weftform.fabric import Fabric, shipped_cards

@@ -29,7 +29,8 @@ def run(
 ) -> None:
     """Run a study and write its result folder: fields for ParaView, history, outline, summary and figures.
 
-    Examples: weftform run hemisphere-0-90 --out results/first; weftform run my.toml --set tools.blank_holder.force_N=500
+    Examples: weftform run hemisphere-0-90 --out results/first; weftform run my.toml --set
+    tools.blank_holder.force_N=500
     """
     from weftform.execution import run as execute
     from weftform.study import Study

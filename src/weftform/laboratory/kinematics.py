@@ -1,103 +1,110 @@
-"""Kinematics and normalisation of the shear tests: closed forms of the paper's Secs. 2.3 and 2.4."""
+"""Geometry and energy of the bias-extension test and of the picture frame (Eqs. 1, 2, 5 to 7).
+
+Angles in radians, lengths in mm, forces in N. See docs/theory/normalisation.md for the derivations.
+"""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-
-
-def kinematic_end(height: float, width: float) -> float:
-    """Displacement at which inextensible yarns are fully closed in a bias test [mm]: ``(sqrt 2 - 1)(H - W)``."""
-    return (math.sqrt(2.0) - 1.0) * (height - width)
+from weftform.errors import MeasurementError
+from weftform.fabric.laws import Floats
 
 
-def bias_shear_angle(displacement: Floats | float, height: float, width: float) -> Floats:
-    """Shear angle of the central zone of a bias test with inextensible yarns [rad] (Eq. 2).
+def check_bias_specimen(height: float, width: float) -> None:
+    """Refuse a specimen without a zone of pure shear.
 
-    With ``D = H - W`` the diagonal of the zone: ``sin gamma = (1 + d / D)^2 - 1``; 90 degrees from the kinematic end on.
+    Raises
+    ------
+    MeasurementError
+        A size is not positive, or the height is less than twice the width (Sec. 2.3.1).
     """
-    stretched = 1.0 + np.asarray(displacement, float) / (height - width)
-    return np.arcsin(np.clip(stretched**2 - 1.0, -1.0, 1.0))
+    if not (np.isfinite(height) and np.isfinite(width) and height > 0 and width > 0):
+        raise MeasurementError("specimen sizes must be positive", expected="mm > 0", got=f"{height:g} x {width:g}")
+    if height < 2.0 * width:
+        raise MeasurementError(
+            "the specimen is too short for a bias-extension test: its centre is not in pure shear",
+            expected="height / width >= 2 (Sec. 2.3.1)",
+            got=f"{height:g} / {width:g} = {height / width:.3g}",
+            hint="height is the free length between the clamps, along the pull",
+        )
 
 
-def bias_force(angle: Floats | float, height: float, width: float, shear_force: object) -> Floats:
-    """Force of a bias test with three zones of uniform shear [N], from the normalised shear force (inverse of Eq. 5).
+def kinematic_limit(height: float, width: float) -> float:
+    """Displacement [mm] at which yarns without stretch or slip lie parallel: (sqrt 2 - 1)(H - W)."""
+    return float(np.sqrt(2.0) - 1.0) * (height - width)
+
+
+def kinematic_angle(displacement: Floats | float, height: float, width: float) -> Floats:
+    """Shear angle [rad] of zone B for inextensible yarns without slip (Eqs. 1 and 2).
+
+    ``gamma = asin((1 + d / D)^2 - 1)`` with ``D = H - W``, the diagonal of zone B; the angle stays at 90
+    degrees beyond :func:`kinematic_limit`. It equals ``90 deg - 2 acos((D + d) / (sqrt 2 D))``.
+    """
+    stretch = 1.0 + np.asarray(displacement, float) / (height - width)
+    return np.arcsin(np.clip(stretch**2 - 1.0, -1.0, 1.0))
+
+
+def kinematic_displacement(angle: Floats | float, height: float, width: float) -> Floats:
+    """Displacement [mm] at a kinematic shear angle [rad]; the inverse of :func:`kinematic_angle`."""
+    return np.asarray((height - width) * (np.sqrt(1.0 + np.sin(np.asarray(angle, float))) - 1.0))
+
+
+def bias_design(angle: Floats, height: float, width: float, basis: Callable[[Floats], Floats]) -> Floats:
+    """Force [N] of the test per unit of each coefficient of F_sh, shape [points, p] (Eq. 7 solved for F).
+
+    With ``F_sh = sum_k a_k b_k(gamma)`` the energy balance of the test (Eq. 5) reads ::
+
+        F (H/W - 1)(cos g/2 - sin g/2) = sum_k a_k [ (2H - 3W) cos(g) b_k(g) + W cos(g/2) b_k(g/2) ]
+
+    which is linear in ``a_k``. Errors of measurement are in F, so this is the form to put into least
+    squares. For powers ``b_k(g) = g^k`` it is Eq. 7 multiplied by known factors, with ``x z / 2^k`` added
+    in its bracket and ``z = W cos(g/2)``.
 
     Parameters
     ----------
     angle
-        Shear angle of the central zone [rad].
-    shear_force
-        Callable: F_sh [N/mm] of an angle [rad].
-
-    Notes
-    -----
-    Power of the clamp against the torques per area ``C_s = F_sh cos gamma`` of zone B, ``W (2H - 3W) / 2``, and of zone C,
-    ``W^2``, at half the angle and half the rate.
+        Shear angles of zone B [rad], shape [points].
+    height, width
+        Specimen [mm].
+    basis
+        Values of the functions ``b_k``, shape [points, p], at angles [rad].
     """
-    angle = np.asarray(angle, float)
-    half = 0.5 * angle
-    full_torque = shear_force(angle) * np.cos(angle)  # type: ignore[operator]
-    half_torque = shear_force(half) * np.cos(half)  # type: ignore[operator]
-    arm = (height - width) * (np.cos(half) - np.sin(half))
-    return np.asarray((width * (2 * height - 3 * width) * full_torque + width**2 * half_torque) / arm)
+    g = np.asarray(angle, float)
+    half = 0.5 * g
+    pure = (2.0 * height - 3.0 * width) * np.cos(g)
+    lever = (height / width - 1.0) * (np.cos(half) - np.sin(half))
+    torque = pure[:, None] * basis(g) + (width * np.cos(half))[:, None] * basis(half)
+    return np.asarray(torque / lever[:, None])
 
 
-def normalised_shear_force(
-    angle: Floats, force: Floats, height: float, width: float, half_angle_force: object | None = None
-) -> Floats:
-    """Normalised shear force of a bias test [N/mm] by Eq. 5, from its force and shear angle.
+def bias_force(angle: Floats, coefficients: Sequence[float], height: float, width: float) -> Floats:
+    """Force [N] at shear angles of zone B [rad] for F_sh [N/mm] with coefficients of gamma, gamma^2, ..."""
+    powers = np.arange(1, len(coefficients) + 1)
+    design = bias_design(np.atleast_1d(angle), height, width, lambda g: g[:, None] ** powers)
+    return np.asarray(design @ np.asarray(coefficients, float)).reshape(np.shape(angle))
 
-    Parameters
-    ----------
-    angle, force
-        Increasing shear angle of the central zone [rad] and force [N], from the start of the test.
-    half_angle_force
-        Callable F_sh at half the angle; without, the result itself is used there, from the smallest angles upwards.
 
-    Notes
-    -----
-    Eq. 5 holds F_sh at the angle and at half of it. Going up in angle, the half angle has always been done before; between the points
-    the result is interpolated linearly, and below the first it is proportional to the angle.
+def frame_angle(displacement: Floats | float, frame_side: float) -> Floats:
+    """Shear angle [rad] of a picture frame of the given side [mm], pulled along its diagonal.
+
+    ``cos(pi/4 - gamma/2) = 1/sqrt 2 + d / (2 L)``; 90 degrees beyond the end of the travel.
     """
-    angle, force = np.asarray(angle, float), np.asarray(force, float)
-    half = 0.5 * angle
-    drive = (height / width - 1.0) * force * (np.cos(half) - np.sin(half))
-    scale = (2.0 * height - 3.0 * width) * np.cos(angle)
-    found = np.zeros_like(angle)
-    for k, (gamma, pull) in enumerate(zip(angle, drive, strict=True)):
-        if gamma <= 0.0:
-            continue
-        if half_angle_force is not None:
-            at_half = float(half_angle_force(0.5 * gamma))  # type: ignore[operator]
-        else:
-            known = np.flatnonzero(angle[:k] > 0.0)
-            if known.size == 0 or angle[known[0]] > 0.5 * gamma:
-                # proportional below the first known point: F_sh(gamma / 2) = F_sh(gamma) / 2
-                found[k] = pull / (scale[k] + 0.5 * width * math.cos(0.5 * gamma))
-                continue
-            at_half = float(np.interp(0.5 * gamma, angle[known], found[known]))
-        found[k] = (pull - width * at_half * math.cos(0.5 * gamma)) / scale[k]
-    return found
+    cosine = np.sqrt(0.5) + np.asarray(displacement, float) / (2.0 * frame_side)
+    return np.asarray(0.5 * np.pi - 2.0 * np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def frame_force(angle: Floats | float, frame_side: float, fabric_side: float, shear_force: object) -> Floats:
-    """Force along the diagonal of a picture frame [N] from the normalised shear force.
+def frame_limit(frame_side: float) -> float:
+    """Displacement [mm] at which a picture frame is closed."""
+    return float(2.0 - np.sqrt(2.0)) * frame_side
 
-    ``F = 2 F_sh cos(phi) L^2 / L_frame`` with ``phi = (pi / 2 - gamma) / 2`` half the angle of the frame.
+
+def frame_lever(angle: Floats, frame_side: float, fabric_side: float) -> Floats:
+    """Force [N] of a picture frame per unit of normalised shear force [N/mm].
+
+    ``F = 2 cos(pi/4 - gamma/2) F_sh L_fabric^2 / L_frame``: the normalisation of Cao et al. (2008), and the
+    energy balance ``F dd = C_s L_fabric^2 dgamma`` with ``C_s = F_sh cos(gamma)``.
     """
-    angle = np.asarray(angle, float)
-    phi = 0.25 * math.pi - 0.5 * angle
-    return np.asarray(2.0 * shear_force(angle) * np.cos(phi) * fabric_side**2 / frame_side)  # type: ignore[operator]
-
-
-def normalised_frame_force(
-    angle: Floats | float, force: Floats | float, frame_side: float, fabric_side: float
-) -> Floats:
-    """Normalised shear force of a picture frame [N/mm] from the force along its diagonal: inverse of :func:`frame_force`."""
-    phi = 0.25 * math.pi - 0.5 * np.asarray(angle, float)
-    return np.asarray(np.asarray(force, float) * frame_side / (2.0 * np.cos(phi) * fabric_side**2))
+    return np.asarray(2.0 * np.cos(0.25 * np.pi - 0.5 * np.asarray(angle, float)) * fabric_side**2 / frame_side)

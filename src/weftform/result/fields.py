@@ -1,4 +1,6 @@
-"""Fields on the cells and crossings, computed from positions: the laws are functions of the state, so nothing else is needed."""
+"""Fields on the cells and crossings, computed from positions: the laws are functions of the state, so nothing else
+is needed.
+"""
 
 from __future__ import annotations
 
@@ -50,14 +52,17 @@ class Fields:
 
     @cached_property
     def shear_angle(self) -> Floats:
-        """Shear angle of the cells [rad], shape [rows - 1, columns - 1], positive where warp and weft close; NaN where none."""
+        """Shear angle of the cells [rad], shape [rows - 1, columns - 1], positive where warp and weft close; NaN
+        where none.
+        """
         return np.where(self.grid.cells != Cell.ABSENT, _angle(*self.vectors), np.nan)
 
     @cached_property
     def corner_shear(self) -> Floats:
         """Angle by which the connectors that meet at each corner of a cell have closed [rad], shape [4, rows - 1, columns - 1].
 
-        As the paper measures it (Sec. 3.6). Corners in the order (0,0), (1,0), (1,1), (0,1); NaN where a connector is missing.
+        As the paper measures it (Sec. 3.6). Corners in the order (0,0), (1,0), (1,1), (0,1); NaN where a
+        connector is missing.
         """
         warp, weft = self._warp_edges, self._weft_edges
         has_warp, has_weft = self.grid.warp_lines > 0.0, self.grid.weft_lines > 0.0
@@ -130,8 +135,8 @@ class Fields:
     def membrane_stress(self) -> Floats:
         """Cauchy stress (xx, yy, xy) of the membrane [MPa], shape [rows - 1, columns - 1, 3].
 
-        Components in the plane of the cell, in axes that are x and y turned by the smallest rotation that brings z onto the
-        cell's normal; on a flat cell they are x and y.
+        Components in the plane of the cell, in axes that are x and y turned by the smallest rotation that brings
+        z onto the cell's normal; on a flat cell they are x and y.
         """
         g1, g2 = self.vectors
         f1, f2 = self.directions
@@ -191,13 +196,13 @@ class Fields:
 
 
 def _norm(vectors: Floats) -> Floats:
-    return np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+    return np.asarray(np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
 
 
 def _angle(a: Floats, b: Floats) -> Floats:
     """Angle by which two vectors, at right angles at first, have closed [rad]."""
     aa, bb, ab = (np.einsum("...k,...k", p, q) for p, q in ((a, a), (b, b), (a, b)))
-    return np.arctan2(ab, np.sqrt(np.maximum(aa * bb - ab * ab, 0.0)))
+    return np.asarray(np.arctan2(ab, np.sqrt(np.maximum(aa * bb - ab * ab, 0.0))))
 
 
 def _dyad(a: Floats, b: Floats) -> Floats:

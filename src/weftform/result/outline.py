@@ -23,7 +23,8 @@ def formed_outline(grid: YarnGrid, positions: Floats) -> tuple[Floats, Floats, N
     Returns
     -------
     flat, formed, modelled
-        Flat (x, y) [mm], shape [points, 2]; formed (x, y, z) [mm], shape [points, 3]; whether each point is in the modelled part.
+        Flat (x, y) [mm], shape [points, 2]; formed (x, y, z) [mm], shape [points, 3]; whether each point is in
+        the modelled part.
     """
     chain = grid.edge_loops[0]
     flat = grid.flat.reshape(-1, 3)[chain, :2]

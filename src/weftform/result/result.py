@@ -167,8 +167,8 @@ class Result:
         Parameters
         ----------
         points
-            (U along warp, V along weft) from the centre of the blank [mm]; points of the whole blank, mirrored where the model is a
-            part of it.
+            (U along warp, V along weft) from the centre of the blank [mm]; points of the whole blank, mirrored
+            where the model is a part of it.
         stroke
             At the computed instant nearest to this stroke [mm]; the end without.
 
@@ -269,8 +269,8 @@ def _bilinear_nodes(fields: Fields, i: float, j: float) -> Floats:
 def _interpolate_cells(grid: YarnGrid, values: dict[str, Floats], u: float, v: float) -> dict[str, float]:
     """Bilinear interpolation between the centres of the four cells around a material point of the whole blank.
 
-    Cells beyond a plane of symmetry are mirror images: directions are mirrored with them, and where yarns run along the planes
-    the shear angle changes sign, while at 45 degrees warp and weft change places.
+    Cells beyond a plane of symmetry are mirror images: directions are mirrored with them, and where yarns run
+    along the planes the shear angle changes sign, while at 45 degrees warp and weft change places.
     """
     p = u / grid.warp_pitch + grid.centre[0] - 0.5
     q = v / grid.weft_pitch + grid.centre[1] - 0.5
@@ -295,7 +295,9 @@ def _interpolate_cells(grid: YarnGrid, values: dict[str, Floats], u: float, v: f
 
 
 def _cell_values(grid: YarnGrid, values: dict[str, Floats], a: int, b: int) -> dict[str, float] | None:
-    """Values of the cell (a, b) of the whole blank, mirrored into the modelled part where it lies beyond a plane of symmetry."""
+    """Values of the cell (a, b) of the whole blank, mirrored into the modelled part where it lies beyond a plane
+    of symmetry.
+    """
     centre = np.array([a + 0.5 - grid.centre[0], b + 0.5 - grid.centre[1]])
     folded, mirrored = grid.fold(centre * np.array([grid.warp_pitch, grid.weft_pitch]))
     column = int(np.floor(folded[0] / grid.warp_pitch + grid.centre[0] + 1e-9))

@@ -1,8 +1,9 @@
 """Energies for the ledger, evaluated independently of the time loop.
 
-Energies of connectors, hourglass control and contact are functions of the state. The membrane's stress is a function of the state
-but, with constant thickness, has no potential, so its work is integrated with Simpson's rule from entry to entry. Friction and
-damping heat are sums of the time loop. The ledger therefore closes only if the time loop integrates the same physics.
+Energies of connectors, hourglass control and contact are functions of the state. The membrane's stress is a
+function of the state but, with constant thickness, has no potential, so its work is integrated with Simpson's
+rule from entry to entry. Friction and damping heat are sums of the time loop. The ledger therefore closes only if
+the time loop integrates the same physics.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Where compiled kernels are kept: one folder per user and per version of the sources that go into them.
 
-Numba's own cache looks only at the file that defines a function; a kernel here is made of functions of several files, so the
-folder's name carries a hash of all of them.
+Numba's own cache looks only at the file that defines a function; a kernel here is made of functions of several
+files, so the folder's name carries a hash of all of them.
 """
 
 from __future__ import annotations
@@ -41,4 +41,4 @@ def kernel_folder() -> Path:
 def use_kernel_folder() -> None:
     """Point Numba's cache there, unless the user has set NUMBA_CACHE_DIR."""
     if not os.environ.get("NUMBA_CACHE_DIR"):
-        numba.config.CACHE_DIR = str(kernel_folder())
+        numba.config.CACHE_DIR = str(kernel_folder())  # type: ignore[attr-defined]

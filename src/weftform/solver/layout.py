@@ -1,8 +1,9 @@
 """Where each field of a crossing lies in the state array.
 
-The state is one flat array of rows; a row holds, one after the other, the fields of all crossings of one weft index, each padded to
-``stride`` numbers. Fields of the cell (i, j) and of the connectors that start at a crossing lie with the crossing (i, j). Row
-length and stride are constants of the compiled loop, so that LLVM can prove that fields do not overlap.
+The state is one flat array of rows; a row holds, one after the other, the fields of all crossings of one weft
+index, each padded to ``stride`` numbers. Fields of the cell (i, j) and of the connectors that start at a crossing
+lie with the crossing (i, j). Row length and stride are constants of the compiled loop, so that LLVM can prove
+that fields do not overlap.
 """
 
 from __future__ import annotations

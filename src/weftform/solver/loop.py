@@ -1,9 +1,9 @@
 """The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
 
-Order within a sweep, for each row: warp connectors, cells above, weft connectors above, sum on the crossings, contact, update. A
-row is updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its neighbours' edge
-rows (halos), refreshed before each step, so no thread reads what another writes, and every row is computed by the same operations
-in the same order whatever the number of bands.
+Order within a sweep, for each row: warp connectors, cells above, weft connectors above, sum on the crossings,
+contact, update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows; a
+band holds copies of its neighbours' edge rows (halos), refreshed before each step, so no thread reads what
+another writes, and every row is computed by the same operations in the same order whatever the number of bands.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def _sweep_band(
 ):  # fmt: skip
     """One step of the rows ``first`` to ``last`` (halos included) of a band.
 
-    ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges (wider by what
-    its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
+    ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges
+    (wider by what its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
     """
     flush_subnormals()
     for k in range(block):
@@ -145,7 +145,9 @@ def _sweep_band(
 
 @cache
 def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
-    """The compiled time loop for a layout; kernels are cached on disk per user (see :mod:`weftform.solver.kernel_cache`)."""
+    """The compiled time loop for a layout; kernels are cached on disk per user (see
+    :mod:`weftform.solver.kernel_cache`).
+    """
     stride = layout.stride
     row_length = layout.row
     block = layout.block
@@ -161,7 +163,8 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         state, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
         warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
         tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
-        driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha, density,
+        driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
+        density,
     ):  # fmt: skip
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
         environment = flush_subnormals()

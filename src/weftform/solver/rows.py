@@ -1,11 +1,13 @@
 """The loops over one row of the yarn grid, each written so that LLVM turns it into vector code.
 
-What makes that work: all reads are from the state, all writes to scratch arrays (or the other way round), offsets between the fields
-are constants once inlined, indices are unsigned, and there is no branch in a loop body. Shifted reads (``i - 1``) are from another array than
-the one written: a load that overlaps a store of the previous iteration would stop the vectoriser.
+What makes that work: all reads are from the state, all writes to scratch arrays (or the other way round), offsets
+between the fields are constants once inlined, indices are unsigned, and there is no branch in a loop body.
+Shifted reads (``i - 1``) are from another array than the one written: a load that overlaps a store of the
+previous iteration would stop the vectoriser.
 
-Scratch ``edge`` holds three blocks: warp edge forces, upper-edge forces carried to the next row, and half the weft edge forces.
-Scratch ``node`` holds three: weft edge forces, force on the crossings, and the axial contact force.
+Scratch ``edge`` holds three blocks: warp edge forces, upper-edge forces carried to the next row, and half the
+weft edge forces. Scratch ``node`` holds three: weft edge forces, force on the crossings, and the axial contact
+force.
 """
 
 from __future__ import annotations
@@ -78,8 +80,9 @@ def cell_row(
 ):
     """Membrane of the cells between a row and the next: forces on their four edges.
 
-    ``membrane`` = (1 / warp pitch, 1 / weft pitch, E warp, E weft, hourglass stiffness). The force conjugate to ``g1`` is
-    ``a11 g1 + a12 g2`` (mechanics.membrane.covariant_forces); one reciprocal serves all five quotients of a cell.
+    ``membrane`` = (1 / warp pitch, 1 / weft pitch, E warp, E weft, hourglass stiffness). The force conjugate to
+    ``g1`` is ``a11 g1 + a12 g2`` (mechanics.membrane.covariant_forces); one reciprocal serves all five quotients
+    of a cell.
     """
     s = np.uint64(stride)
     step = np.uint64(row_length)
@@ -285,9 +288,9 @@ def face_row(state, row, count, node, stride, field, tool, tool_z, step):
 def contact_row(state, row, count, node, stride, field, tool, tool_z, tool_step, step):
     """Penalty contact and Coulomb friction of a row with one tool; returns the axial force on the fabric [N].
 
-    ``tool`` = (side_s, s0, side_z, z0, radius, half thickness, stiffness per area, friction, tangential ratio). ``tool_step`` is
-    the way of the tool and ``step`` the time since the last evaluation. The friction force is a tangential spring, cut to the
-    Coulomb limit; only its tangential part is kept, so it turns with the surface.
+    ``tool`` = (side_s, s0, side_z, z0, radius, half thickness, stiffness per area, friction, tangential ratio).
+    ``tool_step`` is the way of the tool and ``step`` the time since the last evaluation. The friction force is a
+    tangential spring, cut to the Coulomb limit; only its tangential part is kept, so it turns with the surface.
     """
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s

@@ -270,8 +270,8 @@ class Simulation:
     def inertia_area(self) -> Floats:
         """Area whose mass each crossing carries [mm2], shape [rows, columns].
 
-        A yarn on a free edge is a whole yarn (Eq. 11 counts n + 1 lines) but only half a cell of fabric belongs to it. It is given
-        the mass of a whole yarn, or the one edge would set the stable step of the blank.
+        A yarn on a free edge is a whole yarn (Eq. 11 counts n + 1 lines) but only half a cell of fabric belongs
+        to it. It is given the mass of a whole yarn, or the one edge would set the stable step of the blank.
         """
         grid = self.problem.grid
         warp = np.zeros(grid.shape)
@@ -342,7 +342,8 @@ class Simulation:
     def _choose_step(self) -> None:
         s, grid, membrane = self.last, self.problem.grid, self._membrane
         warp, weft, shear = self._packed
-        # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the truth.
+        # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the
+        # truth.
         _, warp_slope = _largest(warp, s[survey.WARP_STRAIN])
         _, weft_slope = _largest(weft, s[survey.WEFT_STRAIN])
         k_warp, k_weft = warp_slope / grid.warp_pitch, weft_slope / grid.weft_pitch
@@ -428,8 +429,8 @@ class Simulation:
                 self._membrane[0], self._membrane[1],
                 self._tool_table, self._poses, self._touching, self._reactions,
                 self._motion_times, self._motion_values, self._motion_knots, settings.ramp,
-                self._driven_nodes, self._driven_state, self._driven_held, self._driven_modes, self._mode_motion, self._mode_kind,
-                self.clock, steps, stop, settings.damping, self.density,
+                self._driven_nodes, self._driven_state, self._driven_held, self._driven_modes, self._mode_motion,
+                self._mode_kind, self.clock, steps, stop, settings.damping, self.density,
             )
         )  # fmt: skip
 
@@ -459,9 +460,10 @@ class Simulation:
         row, column = int(self.last[survey.WORST_ROW]), int(self.last[survey.WORST_COLUMN])
         u, v = self.problem.grid.material[row, column]
         raise UnstableRun(
-            f"the simulation blew up at step {self.steps}, t = {self.time:.4g} s, near the crossing {u:.1f} mm along warp and "
-            f"{v:.1f} mm along weft from the centre",
-            hint="lower solver.safety, lengthen loading.duration_s, or soften the contact (contact.*.stiffness_N_per_mm3)",
+            f"the simulation blew up at step {self.steps}, t = {self.time:.4g} s, near the crossing "
+            f"{u:.1f} mm along warp and {v:.1f} mm along weft from the centre",
+            hint="lower solver.safety, lengthen loading.duration_s, or soften the contact "
+            "(contact.*.stiffness_N_per_mm3)",
         )
 
     def compile(self) -> None:

@@ -20,10 +20,11 @@ def row_spans(active: NDArray[np.bool_]) -> NDArray[np.int64]:
 
     Notes
     -----
-    Scratch rows keep what the row before wrote, so each loop has to cover whatever a later one reads: warp edges reach one place
-    beyond the crossings of the row and of its neighbours, and the cells above a row as far as the warp edges of both its rows.
+    Scratch rows keep what the row before wrote, so each loop has to cover whatever a later one reads: warp edges
+    reach one place beyond the crossings of the row and of its neighbours, and the cells above a row as far as the
+    warp edges of both its rows.
     """
-    rows, columns = active.shape
+    columns = active.shape[1]
     first = np.where(active.any(axis=1), active.argmax(axis=1), columns)
     last = np.where(active.any(axis=1), columns - 1 - active[:, ::-1].argmax(axis=1), -1)
 

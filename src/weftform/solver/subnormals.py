@@ -1,7 +1,8 @@
 """Flush-to-zero for the thread that runs a sweep.
 
-A sheet at rest ahead of a wave front holds ever smaller velocities; once they are subnormal every operation on them takes a
-slow path (2.4 times the time of a step). On x86 the control register of the vector unit treats them as zero.
+A sheet at rest ahead of a wave front holds ever smaller velocities; once they are subnormal every operation on
+them takes a slow path (2.4 times the time of a step). On x86 the control register of the vector unit treats them
+as zero.
 """
 
 from __future__ import annotations

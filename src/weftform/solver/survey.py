@@ -188,7 +188,9 @@ def largest_on(coefficients, degree, pieces, width, end_slope, end):
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True)
 def contact_forces(rows, first_tool, tool_table, poses):
-    """Force of all tools on each crossing [N], shape [rows, columns, 3], from fields of shape [rows, fields, columns]."""
+    """Force of all tools on each crossing [N], shape [rows, columns, 3], from fields of shape [rows, fields,
+    columns].
+    """
     count, _, columns = rows.shape
     total = np.zeros((count, columns, 3))
     for j in range(count):

@@ -54,9 +54,10 @@ class BlankTable(Declared):
 class ToolTable(Declared):
     """A rigid tool of revolution about the z axis, on one side of the fabric.
 
-    ``hemisphere`` and ``flat-punch`` have ``diameter_mm`` (the flat punch also ``edge_radius_mm``); ``opening`` is a flat face with a hole of
-    ``hole_diameter_mm`` and a fillet ``edge_radius_mm``. A tool stands still (``fixed``), makes the stroke of the loading
-    (``stroke``) or is pushed on the fabric by ``force_N`` on the whole blank and free along z (``force``).
+    ``hemisphere`` and ``flat-punch`` have ``diameter_mm`` (the flat punch also ``edge_radius_mm``); ``opening``
+    is a flat face with a hole of ``hole_diameter_mm`` and a fillet ``edge_radius_mm``. A tool stands still
+    (``fixed``), makes the stroke of the loading (``stroke``) or is pushed on the fabric by ``force_N`` on the
+    whole blank and free along z (``force``).
     """
 
     shape: Literal["hemisphere", "flat-punch", "opening"]
@@ -101,7 +102,9 @@ class ContactTable(Declared):
 
 
 class FormingLoading(Declared):
-    """Stroke and its timing. Times are of the simulation: with quasi-static forming they only set how many steps are made."""
+    """Stroke and its timing. Times are of the simulation: with quasi-static forming they only set how many steps
+    are made.
+    """
 
     stroke_mm: Positive
     closing_s: NotNegative = 0.01
@@ -270,8 +273,9 @@ class ElementTable(Declared):
 class Move(Declared):
     """One phase of an element test; exactly one of its values is given.
 
-    ``warp_stretch``: length of the warp over its initial length at the end of the phase; ``shear_angle_deg``: simple shear, the weft leans
-    towards the warp at constant height; ``rotation_deg``: a rigid turn, only as the last phase.
+    ``warp_stretch``: length of the warp over its initial length at the end of the phase; ``shear_angle_deg``:
+    simple shear, the weft leans towards the warp at constant height; ``rotation_deg``: a rigid turn, only as the
+    last phase.
     """
 
     warp_stretch: Annotated[float, Field(gt=0.4, lt=2.5, allow_inf_nan=False)] | None = None

@@ -1,4 +1,6 @@
-"""Grids of laboratory specimens: their edges run along yarns or along the bias, and their centre is the centre of the grid."""
+"""Grids of laboratory specimens: their edges run along yarns or along the bias, and their centre is the centre of
+the grid.
+"""
 
 from __future__ import annotations
 

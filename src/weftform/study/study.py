@@ -18,7 +18,6 @@ from weftform.declared import line_of, read_toml, validated
 from weftform.errors import CardError, StudyError
 from weftform.fabric import Fabric
 from weftform.fabric.fabric import merge_tables
-from weftform.study.shipped import shipped_studies
 from weftform.study.schema import (
     MODELS,
     BiasModel,
@@ -32,6 +31,7 @@ from weftform.study.schema import (
     TensileModel,
     ToolTable,
 )
+from weftform.study.shipped import shipped_studies
 from weftform.study.specimens import specimen_grid
 from weftform.tooling import RigidTool, flat_punch, hemisphere, opening
 
@@ -250,7 +250,7 @@ def _outline(blank: BlankTable) -> Polygon:
         assert blank.diameter_mm is not None
         return disc(blank.diameter_mm)
     assert blank.points_mm is not None
-    shape = polygon([tuple(p) for p in blank.points_mm])
+    shape = polygon(list(blank.points_mm))
     if not shape.is_valid or shape.area <= 0.0:
         from shapely.validation import explain_validity
 

@@ -1,4 +1,6 @@
-"""Rigid tools as rounded edges of revolution (:mod:`weftform.mechanics.contact`), placed against a flat fabric at z = 0."""
+"""Rigid tools as rounded edges of revolution (:mod:`weftform.mechanics.contact`), placed against a flat fabric at
+z = 0.
+"""
 
 from __future__ import annotations
 
