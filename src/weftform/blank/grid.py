@@ -318,7 +318,8 @@ def build_grid(
         )
     u0, v0, u1, v1 = shapes.bounds_along(outline, warp_angle)
     part = shapes.kept_part(outline, planes)
-    shortest = min(u1 - u0, v1 - v0)
+    x0, y0, x1, y1 = outline.bounds
+    shortest = min(u1 - u0, v1 - v0, x1 - x0, y1 - y0)
     if cell_length > shortest * (1.0 + 1e-9):
         _no_cell(cell_length)
     # whole and half cells cover the area, so there are at least this many; an area is known without laying them out
@@ -332,7 +333,6 @@ def build_grid(
         # The first line lies on the edge of the outline, so the centre of the press may lie between crossings.
         centre = (-u0 / along, -v0 / across)
     elif fitted and along_bias:
-        x0, y0, x1, y1 = outline.bounds
         along = across = shapes.fit_along_bias(x1 - x0, y1 - y0, cell_length, bool(planes))
         start = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         c, s = math.cos(warp_angle), math.sin(warp_angle)
