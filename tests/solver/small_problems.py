@@ -17,6 +17,8 @@ from weftform.solver import layout as at
 from weftform.tooling import RigidTool, flat_punch, hemisphere
 
 FABRIC = Fabric.load("hexforce-48600-c1300")
+SMOOTH = Fabric.load("hexforce-48600-c1300", override={"tension": {"warp": {"slack_ratio": 1.0}}})
+"""Yarns that push as they pull: no kink at zero elongation, where a yarn that goes slack makes a vibration chaotic."""
 THICKNESS = FABRIC.thickness
 NOBODY = Driven(np.zeros(0, np.int64), np.zeros((1, 0, 3)), (0,), (0,))
 STILL = Motion((0.0, 1.0), (0.0, 0.0))
@@ -35,6 +37,7 @@ def bias_grid(diagonals=3, length=2.7, planes=()):
 
 def free(grid, fabric=FABRIC, threads=1, **settings):
     """A patch that nothing holds."""
+    assert fabric.balanced
     return Simulation(Problem(grid, fabric, motions=(STILL,), driven=NOBODY, settings=Settings(**settings)), threads)
 
 

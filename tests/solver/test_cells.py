@@ -109,8 +109,8 @@ def test_forces_of_a_cell_are_those_of_the_total_form_and_eq_11(gradient):
 
 
 def test_forces_of_a_rectangular_cell_use_the_spacing_of_each_direction():
-    grid = build_grid(rectangle(3.0, 8.0), cell_length=3.5, warp_angle=0.0)
-    assert (grid.warp_pitch, grid.weft_pitch) == (3.0, 4.0)
+    grid = build_grid(rectangle(3.0, 8.0), cell_length=2.9, warp_angle=0.0)
+    assert (grid.warp_pitch, grid.weft_pitch) == pytest.approx((3.0, 8.0 / 3.0))
     gradient = np.array([[1.01, 0.2], [0.1, 1.004]])
     _, forces = held_at(grid, affine(grid, gradient))
     expected = nodal_forces(grid, gradient).reshape(-1, 3)
@@ -118,7 +118,8 @@ def test_forces_of_a_rectangular_cell_use_the_spacing_of_each_direction():
 
 
 def test_power_of_the_corner_forces_is_that_of_the_stress():
-    """sigma : D per current volume, with D from a neighbouring gradient (central difference, error of second order)."""
+    """sigma : D per current volume. The packed shear law is off by up to 1e-8 of its largest tau / tan(gamma / 2), 18 MPa at
+    90 degrees, which is 3e-6 of the stress here."""
     start = np.array([[1.005, 0.35], [0.1, 1.01]])
     rate = np.array([[0.4, -0.7], [0.3, 0.2]])
     card = FABRIC.card.membrane
@@ -127,8 +128,8 @@ def test_power_of_the_corner_forces_is_that_of_the_stress():
     power = float(np.sum(forces[:, :2] * (grid.flat.reshape(-1, 3)[:, :2] @ rate.T)))
     velocity_gradient = rate @ np.linalg.inv(start)
     stress = total_form(start, card.warp_modulus_MPa, card.weft_modulus_MPa, FABRIC.shear).stress
-    volume = fabric.thickness * grid.area * np.linalg.det(start)
-    assert power == pytest.approx(volume * float(np.sum(stress * velocity_gradient)), rel=1e-7)
+    volume = FABRIC.thickness * grid.area * np.linalg.det(start)
+    assert power == pytest.approx(volume * float(np.sum(stress * velocity_gradient)), rel=3e-6)
 
 
 @pytest.mark.parametrize("length", [50.0, 25.0, 25.0 / 1.2])

@@ -385,7 +385,8 @@ class Simulation:
         if self.bands > 1:
             import numba
 
-            numba.set_num_threads(self.bands)
+            # more bands than processors wait for each other; the result is the same
+            numba.set_num_threads(min(self.bands, numba.config.NUMBA_NUM_THREADS))
         return int(
             self._loop(
                 self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self.columns,
@@ -443,6 +444,7 @@ class Simulation:
             "clock": self.clock.copy(),
             "driven": self._driven_state.copy(),
             "tools": self._tool_table.copy(),
+            "surveys": np.array([float(self._surveys)]),
         }
 
     def restore(self, saved: dict[str, Floats]) -> None:
@@ -463,6 +465,7 @@ class Simulation:
         self.clock[:] = saved["clock"]
         self._driven_state[:] = saved["driven"]
         self._tool_table[:] = saved["tools"]
+        self._surveys = int(saved["surveys"][0])
         self.last = self._survey()
 
     # -- looking ---------------------------------------------------------------------------------------------------
