@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from weftform.fabric.card import Declared, Finite, NotNegative, Positive
 
-Coefficient = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False)]
+Coefficient = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
 
 
 class FabricChoice(Declared):
@@ -28,8 +28,8 @@ class BlankTable(Declared):
     diameter_mm: Positive | None = None
     points_mm: list[tuple[Finite, Finite]] | None = Field(default=None, min_length=3)
     cell_length_mm: Positive
-    fit_cells: bool = True
-    warp_angle_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)] = 0.0
+    fit_cells: Annotated[bool, Field(strict=True)] = True
+    warp_angle_deg: Annotated[float, Field(strict=True, ge=-180, le=180, allow_inf_nan=False)] = 0.0
     symmetry: Literal["full", "half-x", "half-y", "quarter"] = "full"
 
     @model_validator(mode="after")
@@ -94,7 +94,7 @@ class ContactTable(Declared):
 
     friction: Coefficient
     stiffness_N_per_mm3: Positive = 30.0
-    tangential_ratio: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 0.5
+    tangential_ratio: Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)] = 0.5
 
 
 class LoadingTable(Declared):
@@ -103,24 +103,24 @@ class LoadingTable(Declared):
     stroke_mm: Positive
     closing_s: NotNegative = 0.01
     duration_s: Positive
-    ramp: Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)] = 0.2
+    ramp: Annotated[float, Field(strict=True, gt=0, le=0.5, allow_inf_nan=False)] = 0.2
 
 
 class SolverTable(Declared):
     """Numerical settings."""
 
-    mass_scaling: Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)] = 1.0
+    mass_scaling: Annotated[float, Field(strict=True, ge=1, le=1e6, allow_inf_nan=False)] = 1.0
     damping_per_s: NotNegative = 0.0
     hourglass: NotNegative = 0.01
-    safety: Annotated[float, Field(gt=0, le=0.98, allow_inf_nan=False)] = 0.9
-    most_steps: Annotated[int, Field(gt=0, le=1_000_000_000)] = 20_000_000
+    safety: Annotated[float, Field(strict=True, gt=0, le=0.98, allow_inf_nan=False)] = 0.9
+    most_steps: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 20_000_000
 
 
 class OutputTable(Declared):
     """How often to keep fields and history."""
 
-    frames: Annotated[int, Field(ge=2, le=2000)] = 31
-    rows: Annotated[int, Field(ge=2, le=100_000)] = 301
+    frames: Annotated[int, Field(strict=True, ge=2, le=2000)] = 31
+    rows: Annotated[int, Field(strict=True, ge=2, le=100_000)] = 301
 
 
 class StudyModel(Declared):
