@@ -191,7 +191,7 @@ class FormingRun:
         self._last_report = 0.0
         try:
             for stop in stops:
-                if stop < simulation.time * (1 - 1e-9) or (self._resume and stop <= self._resumed_to):
+                if self._resume and stop <= self._resumed_to:
                     continue
                 self._march(float(stop))
                 if stop in rows_at:
