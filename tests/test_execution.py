@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import time
 
 import h5py
 import numpy as np
@@ -106,7 +105,7 @@ def test_fields_file_holds_frames_whose_points_move(dome):
         moved = root["PointData/Displacement_mm"][:].reshape(7, count, 3)
         np.testing.assert_allclose(points - moved, np.tile(dome.grid.flat[dome.grid.active], (7, 1, 1)), atol=1e-12)
         top = points[..., 2].max(axis=1)
-        assert (np.diff(top) > 3.0).all()
+        assert (np.diff(top) > 2.0).all()
         assert np.isfinite(root["CellData/ShearAngle_deg"][:]).all()
     np.testing.assert_allclose(dome.strokes[[0, -1]], [0.0, 30.0], atol=1e-6)
 
@@ -266,7 +265,7 @@ def test_nothing_to_resume_is_refused(tmp_path):
 
 
 def test_run_that_blows_up_stops_and_keeps_the_last_good_output(tmp_path):
-    """A penalty so stiff against so small a step estimate cannot be had from a valid study, so the speed does it: a stroke in 2 ms."""
+    """A stroke of 30 mm in 0.8 ms: yarns straighten, and stiffen, within the steps between two looks at the stable step."""
     study = Study.load("hemisphere-0-90", {**SMALL, "loading.duration_s": 0.0008, "output.rows": 101, "solver.damping_per_s": 0.0})
     out = tmp_path / "out"
     with pytest.raises(UnstableRun, match="blew up at step"):
@@ -349,4 +348,3 @@ def test_no_result_is_refused(tmp_path):
         Result.open(tmp_path / "nowhere")
     with pytest.raises(ResultError, match="missing"):
         Result.open(tmp_path)
-    assert time.monotonic() > 0

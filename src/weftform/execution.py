@@ -17,8 +17,8 @@ from weftform.errors import StudyError, UnstableRun
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.outline import draw_in, formed_outline
-from weftform.result.writer import ResultWriter, claim_folder, write_whole
-from weftform.solver import Ledger, Simulation
+from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
+from weftform.solver import Ledger, Simulation, survey
 from weftform.study import Study
 from weftform.study.problem import forming_problem
 
@@ -162,6 +162,7 @@ class FormingRun:
         self.punch = next(k for k, tool in enumerate(study.tools) if tool.motion == "stroke")
         self.holder = next((k for k, tool in enumerate(study.tools) if tool.motion == "force"), None)
         self.rows: list[dict[str, float]] = []
+        self._last_sound = self._fields()
         self.peak_penetration = 0.0
         self.peak_speed_step = 0
         self.wall = 0.0
@@ -265,13 +266,14 @@ class FormingRun:
         )
         self._forces.clear()
         holder = self.holder
+        self._last_sound = self._fields()
         row = {
             "time_s": simulation.time,
             "displacement_mm": self.stroke,
             "force_N": force,
             "holder_displacement_mm": simulation.tool_position(holder) if holder is not None else 0.0,
             "holder_reaction_N": abs(simulation.tool_reaction(holder)) * n if holder is not None else 0.0,
-            "shear_angle_max_deg": self._fields().largest_shear(),
+            "shear_angle_max_deg": self._last_sound.largest_shear(),
             "kinetic_energy_mJ": n * ledger.kinetic,
             "internal_energy_mJ": n * ledger.internal,
             "connector_energy_mJ": n * ledger.connectors,
@@ -292,20 +294,23 @@ class FormingRun:
     # -- the end ----------------------------------------------------------------------------------------------------
 
     def _finish(self, writer: ResultWriter, status: str) -> None:
-        if status != "done" and np.isfinite(self.simulation.positions).all():
+        if status != "done" and self._sound:
             writer.row(self._enter_row())
             writer.frame(self.simulation.time, self.stroke, self._fields(), self.simulation.contact_forces)
             self._checkpoint(self.simulation.time)
-        if np.isfinite(self.simulation.positions).all():
-            writer.outline(self._fields())
+        writer.outline(self._last_sound)
         writer.summary(self.summary(status))
+
+    @property
+    def _sound(self) -> bool:
+        """Whether the state is one of a run that has not blown up."""
+        return bool(self.simulation.last[survey.FINITE])
 
     def summary(self, status: str) -> dict[str, Any]:
         """What ``summary.json`` says."""
         study, grid, simulation = self.study, self.grid, self.simulation
-        fields = self._fields()
+        fields = self._last_sound
         energy = energy_summary(self.rows)
-        finite = bool(np.isfinite(simulation.positions).all())
         warnings = self._warnings(energy)
         values: dict[str, Any] = {
             "study": study.name,
@@ -318,7 +323,7 @@ class FormingRun:
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
             "energy": energy,
-            "shear_angle_deg": fields.shear_statistics() if finite else None,
+            "shear_angle_deg": fields.shear_statistics(),
             "punch_force_N": self.rows[-1]["force_N"] if self.rows else 0.0,
             "stroke_mm": self.stroke,
             "holder_displacement_mm": self.rows[-1]["holder_displacement_mm"] if self.rows else 0.0,
@@ -326,9 +331,8 @@ class FormingRun:
             "penetration_share_of_thickness": self.peak_penetration / study.fabric.thickness,
             "blank": blank_summary(study),
         }
-        if finite:
-            flat, formed, _ = formed_outline(grid, fields.positions)
-            values["draw_in_mm"] = draw_in(flat, formed, diagonal_angle(study.outline))
+        flat, formed, _ = formed_outline(grid, fields.positions)
+        values["draw_in_mm"] = draw_in(flat, formed, diagonal_angle(study.outline))
         return values
 
     def _warnings(self, energy: dict[str, float]) -> list[str]:
@@ -372,6 +376,7 @@ class FormingRun:
                 self.simulation.restore({k: data[k] for k in data.files})
                 self.rows = [dict(zip(HISTORY, (float(v) for v in row), strict=True)) for row in data["history"]]
                 self._resumed_to, self.peak_penetration, self.wall = (float(v) for v in data["progress"])
+                self._last_sound = self._fields()
         except (OSError, ValueError, KeyError) as problem:
             raise ResultError(
                 f"the checkpoint does not belong to this study ({problem})",
@@ -423,7 +428,7 @@ def _versions() -> str:
     from weftform import __version__
 
     return (
-        f"resolved by weftform {__version__} (Python {platform.python_version()}, numpy {np.__version__}, "
+        f"{RESOLVED} {__version__} (Python {platform.python_version()}, numpy {np.__version__}, "
         f"numba {numba.__version__}, scipy {scipy.__version__}, h5py {h5py.__version__})\n"
         "every default is written out: `weftform run` on this file repeats the run"
     )
