@@ -1,4 +1,5 @@
-"""Running a study: the result folder, its numbers, interruption and resumption, refusals; slow: the physics of the hemisphere."""
+"""Running a study: the result folder, its numbers, interruption and resumption, refusals; slow: the physics of the
+hemisphere."""
 
 from __future__ import annotations
 
@@ -9,7 +10,6 @@ import math
 import h5py
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from weftform.errors import CardError, ResultError, StudyError, UnstableRun
 from weftform.execution import HISTORY, run, threads_for
@@ -34,7 +34,7 @@ def dome(domes, request):
     return domes[request.param]
 
 
-# -- the result folder --------------------------------------------------------------------------------------------------------
+# -- the result folder -----------------------------------------------------------------------------
 
 
 def test_summary_says_what_the_contract_asks_for(dome):
@@ -77,8 +77,8 @@ def test_blank_holder_carries_its_force_on_the_whole_blank(dome):
 
 
 def test_work_is_the_integral_of_the_punch_force(dome):
-    """The punch does most of the work, the holder the rest (force times its way). Forces are means between rows, so the sum over
-    rows is the integral up to the change of speed within a row."""
+    """The punch does most of the work, the holder the rest (force times its way). Forces are means between rows, so
+    the sum over rows is the integral up to the change of speed within a row."""
     history = dome.history
     punch = float(np.sum(history["force_N"][1:] * np.diff(history["displacement_mm"])))
     holder = 238.45 * history["holder_displacement_mm"][-1]
@@ -88,7 +88,12 @@ def test_work_is_the_integral_of_the_punch_force(dome):
 @pytest.mark.parametrize("frames", [2, 7, 31, 50])
 def test_every_asked_instant_is_kept(tmp_path, frames):
     """Also where rows and frames fall within a step of each other, or are equal but for rounding."""
-    changes = {"blank.cell_length_mm": 5.36, "loading.stroke_mm": 0.5, "loading.duration_s": 0.01, "loading.closing_s": 0.005}
+    changes = {
+        "blank.cell_length_mm": 5.36,
+        "loading.stroke_mm": 0.5,
+        "loading.duration_s": 0.01,
+        "loading.closing_s": 0.005,
+    }
     study = Study.load("hemisphere-0-90", {**changes, "output.frames": frames, "output.rows": 301})
     result = run(study, tmp_path / "out")
     assert len(result.times) == frames
@@ -152,7 +157,7 @@ def test_dome_has_the_symmetry_of_its_yarns(dome):
     assert s["edge_x"] == pytest.approx(s["edge_y"], abs=0.02)
 
 
-# -- probes -------------------------------------------------------------------------------------------------------------------
+# -- probes ----------------------------------------------------------------------------------------
 
 
 def test_probe_at_cell_centres_equals_the_field(dome):
@@ -214,7 +219,7 @@ def test_probe_at_a_stroke_that_was_not_computed_is_refused(dome):
     assert formed.position_mm[2] > flat.position_mm[2] + 20.0
 
 
-# -- interruption ---------------------------------------------------------------------------------------------------------------
+# -- interruption ----------------------------------------------------------------------------------
 
 
 def test_interrupted_run_keeps_its_outputs_and_resumes_to_the_same_numbers(domes, tmp_path):
@@ -265,8 +270,11 @@ def test_nothing_to_resume_is_refused(tmp_path):
 
 
 def test_run_that_blows_up_stops_and_keeps_the_last_good_output(tmp_path):
-    """A stroke of 30 mm in 0.8 ms: yarns straighten, and stiffen, within the steps between two looks at the stable step."""
-    study = Study.load("hemisphere-0-90", {**SMALL, "loading.duration_s": 0.0008, "output.rows": 101, "solver.damping_per_s": 0.0})
+    """A stroke of 30 mm in 0.8 ms: yarns straighten, and stiffen, within the steps between two looks at the stable
+    step."""
+    study = Study.load(
+        "hemisphere-0-90", {**SMALL, "loading.duration_s": 0.0008, "output.rows": 101, "solver.damping_per_s": 0.0}
+    )
     out = tmp_path / "out"
     with pytest.raises(UnstableRun, match="blew up at step"):
         run(study, out)
@@ -278,7 +286,7 @@ def test_run_that_blows_up_stops_and_keeps_the_last_good_output(tmp_path):
     json.loads((out / "summary.json").read_text(), parse_constant=lambda name: pytest.fail(name))
 
 
-# -- refusals ---------------------------------------------------------------------------------------------------------------------
+# -- refusals --------------------------------------------------------------------------------------
 
 
 def test_foreign_folder_is_refused_and_left_alone(tmp_path):
@@ -314,9 +322,7 @@ def test_folder_that_cannot_be_written_is_refused(tmp_path):
         run(Study.load("hemisphere-0-90", SMALL), tmp_path / "file" / "out")
 
 
-@pytest.mark.parametrize(
-    ("study", "error"), [("no-such-study", StudyError), ("missing.toml", StudyError)]
-)
+@pytest.mark.parametrize(("study", "error"), [("no-such-study", StudyError), ("missing.toml", StudyError)])
 def test_nothing_is_written_for_a_bad_study(tmp_path, study, error):
     with pytest.raises(error):
         run(study, tmp_path / "out")

@@ -24,7 +24,7 @@ def grid_of(outline, length=5.0, degrees=0.0, planes=(), **more):
     return build_grid(outline, cell_length=length, warp_angle=math.radians(degrees), planes=planes, **more)
 
 
-# -- areas ---------------------------------------------------------------------------------------------------------
+# -- areas -----------------------------------------------------------------------------------------
 
 
 @each_part
@@ -42,7 +42,8 @@ def test_rectangle_along_the_yarns_is_met_exactly_by_whole_cells(planes, degrees
 @pytest.mark.parametrize("degrees", [45, -45, 135, -135])
 @pytest.mark.parametrize("length", [3.6, 4.5])
 def test_rectangle_along_the_bias_is_met_exactly_by_whole_and_half_cells(planes, degrees, length):
-    """60 and 40 mm are 12 and 8 diagonals of 5 mm. At 4.5 mm, 9 and 6 fit the full blank: no crossing lies at its centre."""
+    """60 and 40 mm are 12 and 8 diagonals of 5 mm. At 4.5 mm, 9 and 6 fit the full blank: no crossing lies at its
+    centre."""
     if planes and length == 4.5:
         length = 3.55
     grid = grid_of(rectangle(60, 40), length, degrees, planes)
@@ -66,8 +67,9 @@ def test_whole_cells_count_one_and_half_cells_one_half(outline, degrees):
     [(disc(80), 0), (disc(80), 45), (disc(80), 20), (rectangle(80, 60), 20), (L_SHAPE, 33), (DIAMOND, 10)],
 )
 def test_any_other_outline_and_angle_misses_little_area_and_less_with_smaller_cells(outline, degrees):
-    """A staircase with half cells misses, per cell that the edge crosses, at most a quarter of the cell, with a sign that
-    varies: the error is below that of the crossed cells all on one side, which is perimeter x length / (4 area)."""
+    """A staircase with half cells misses, per cell that the edge crosses, at most a quarter of the cell, with a sign
+    that varies: the error is below that of the crossed cells all on one side, which is perimeter x length / (4
+    area)."""
     for length in (4.0, 2.0, 1.0):
         grid = grid_of(outline, length, degrees)
         bound = 0.25 * outline.length * length / outline.area
@@ -94,7 +96,7 @@ def test_diamond_at_0_degrees_is_met_by_half_cells_on_its_four_sides():
         assert (np.sign(centres[grid.cells == kind]) == side).all()
 
 
-# -- position and angle ----------------------------------------------------------------------------------------------
+# -- position and angle ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("degrees", [0, 90, 45, -45, 20, -135])
@@ -141,7 +143,7 @@ def test_planes_at_45_degrees_run_along_cell_diagonals():
     assert (grid.flat[grid.active][:, :2] > -1e-9).all()
 
 
-# -- connectors and crossings -------------------------------------------------------------------------------------------
+# -- connectors and crossings ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -193,7 +195,7 @@ def test_polygons_of_the_cells_have_their_areas_and_turn_counterclockwise():
         assert area == pytest.approx(grid.cell_share[j, i] * grid.cell_area, rel=1e-9)
 
 
-# -- the edge -----------------------------------------------------------------------------------------------------------
+# -- the edge --------------------------------------------------------------------------------------
 
 
 def signed_area(points):
@@ -251,7 +253,7 @@ def test_fold_of_a_full_blank_changes_nothing():
     assert not mirrored.any()
 
 
-# -- refusals ------------------------------------------------------------------------------------------------------------
+# -- refusals --------------------------------------------------------------------------------------
 
 
 def test_unsymmetric_outline_is_refused_with_the_plane():

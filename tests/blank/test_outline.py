@@ -44,7 +44,8 @@ def test_kept_part_lies_on_the_positive_side():
 
 
 @pytest.mark.parametrize(
-    ("length", "target", "even", "count"), [(150, 2.69, False, 56), (150, 2.69, True, 56), (10, 3, True, 4), (10, 3, False, 3)]
+    ("length", "target", "even", "count"),
+    [(150, 2.69, False, 56), (150, 2.69, True, 56), (10, 3, True, 4), (10, 3, False, 3)],
 )
 def test_nearest_count_of_cells_divides_the_side(length, target, even, count):
     found, fitted = fit_along_yarns(length, target, even)
@@ -52,7 +53,9 @@ def test_nearest_count_of_cells_divides_the_side(length, target, even, count):
     assert fitted * count == pytest.approx(length, rel=1e-15)
 
 
-@pytest.mark.parametrize(("width", "height", "target"), [(150, 150, 2.69), (60, 40, 3.6), (150, 50, 2.69), (100, 40, 2.0)])
+@pytest.mark.parametrize(
+    ("width", "height", "target"), [(150, 150, 2.69), (60, 40, 3.6), (150, 50, 2.69), (100, 40, 2.0)]
+)
 @pytest.mark.parametrize("even", [True, False])
 def test_both_sides_span_whole_cell_diagonals(width, height, target, even):
     length = fit_along_bias(width, height, target, even)

@@ -47,7 +47,8 @@ def test_outline_is_closed_in_order_and_mirrored(planes, degrees):
 @pytest.mark.parametrize("planes", PLANES.values(), ids=PLANES)
 @pytest.mark.parametrize("degrees", [0, 45])
 def test_draw_in_of_an_affine_deformation(planes, degrees):
-    """x scaled by 0.9 and y by 0.8: 3 mm at the mid edge x = 30, 4 mm at y = 20; the corner (30, 20) moves by (3, 4)."""
+    """x scaled by 0.9 and y by 0.8: 3 mm at the mid edge x = 30, 4 mm at y = 20; the corner (30, 20) moves by (3,
+    4)."""
     grid = build_grid(rectangle(60, 40), cell_length=3.6, warp_angle=math.radians(degrees), planes=planes)
     positions = grid.flat * np.array([0.9, 0.8, 1.0]) + np.array([0.0, 0.0, 3.0])
     flat, formed, _ = formed_outline(grid, positions)

@@ -116,7 +116,8 @@ def test_opening_angle_is_negative():
 
 
 def test_statistics_weigh_cells_by_area():
-    """Half cells count half. Left half sheared by 0.3, right by 0.1: the mean is over areas, p99 and the largest are on the left."""
+    """Half cells count half. Left half sheared by 0.3, right by 0.1: the mean is over areas, p99 and the largest are
+    on the left."""
     grid = GRIDS["45"]
     fields = Fields(grid, FABRIC, deformed(grid))
     angles = fields.shear_angle

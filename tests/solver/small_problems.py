@@ -1,7 +1,7 @@
 """Small problems for the tests of the solver.
 
-Compiled loops are cached per layout. All problems here keep to four: (whole | with half cells) x (at most 8 columns, driven, no
-tool | 9 to 24 columns, three tools, not driven). A free patch is one whose set of driven crossings is empty.
+Compiled loops are cached per layout. All problems here keep to four: (whole | with half cells) x (at most 8 columns,
+driven, no tool | 9 to 24 columns, three tools, not driven). A free patch is one whose set of driven crossings is empty.
 """
 
 from __future__ import annotations
@@ -42,11 +42,12 @@ def free(grid, fabric=FABRIC, threads=1, **settings):
 
 
 def driven(grid, nodes, displacements, motions, fabric=FABRIC, threads=1, **settings):
-    """Crossings ``nodes`` (flat indices) driven by ``displacements``, shape [motions, nodes, 3], each times its motion."""
-    drive = Driven(
-        np.asarray(nodes), np.asarray(displacements), tuple(range(len(motions))), (0,) * len(motions)
+    """Crossings ``nodes`` (flat indices) driven by ``displacements``, shape [motions, nodes, 3], each times its
+    motion."""
+    drive = Driven(np.asarray(nodes), np.asarray(displacements), tuple(range(len(motions))), (0,) * len(motions))
+    return Simulation(
+        Problem(grid, fabric, motions=tuple(motions), driven=drive, settings=Settings(**settings)), threads
     )
-    return Simulation(Problem(grid, fabric, motions=tuple(motions), driven=drive, settings=Settings(**settings)), threads)
 
 
 def all_nodes(grid):
@@ -58,7 +59,8 @@ def edge_nodes(grid):
 
 
 def held_at(grid, displacement, fabric=FABRIC, **settings):
-    """Every crossing moved by ``displacement`` [rows, columns, 3] and held; returns the internal forces [nodes, 3] there.
+    """Every crossing moved by ``displacement`` [rows, columns, 3] and held; returns the internal forces [nodes, 3]
+    there.
 
     There is nothing dynamic in it: the forces are those of the positions.
     """
@@ -74,7 +76,8 @@ def held_at(grid, displacement, fabric=FABRIC, **settings):
 
 
 def affine(grid, gradient, origin=(0.0, 0.0, 0.0)):
-    """Displacement of the crossings by a deformation gradient, shape [3, 2] or [3, 3] of yarn axes, [rows, columns, 3]."""
+    """Displacement of the crossings by a deformation gradient, shape [3, 2] or [3, 3] of yarn axes, [rows, columns,
+    3]."""
     gradient = np.asarray(gradient, float)
     flat = grid.flat
     if gradient.shape == (2, 2):
@@ -116,7 +119,7 @@ def smooth_velocities(grid, speed, seed=1):
     return speed * (waves @ rng.uniform(-1, 1, (5, 3))) * grid.active[..., None]
 
 
-# -- with tools ---------------------------------------------------------------------------------------------------------
+# -- with tools ------------------------------------------------------------------------------------
 
 
 def plate(name, up, motion="fixed", friction=0.0, stiffness=30.0, force=0.0, away=0.0):
@@ -141,6 +144,12 @@ def pressed(grid, friction=0.0, force=40.0, closing=0.01, threads=1, **settings)
         ball(1.0, away=500.0),
     )
     problem = Problem(
-        grid, FABRIC, tools, (STILL, Motion((0.0, closing), (0.0, 1.0))), stroke=0, holding=1, settings=Settings(**settings)
+        grid,
+        FABRIC,
+        tools,
+        (STILL, Motion((0.0, closing), (0.0, 1.0))),
+        stroke=0,
+        holding=1,
+        settings=Settings(**settings),
     )
     return Simulation(problem, threads)

@@ -100,7 +100,8 @@ def test_square_cell_pulled_on_its_diagonal(degrees, expected):
     ],
 )
 def test_forces_of_a_cell_are_those_of_the_total_form_and_eq_11(gradient):
-    """The shear law is packed to 1e-8 of its scale, the logarithm to 1e-10; 1e-7 of the force leaves an order to both."""
+    """The shear law is packed to 1e-8 of its scale, the logarithm to 1e-10; 1e-7 of the force leaves an order to
+    both."""
     gradient = np.asarray(gradient)
     grid = one_cell()
     _, forces = held_at(grid, affine(grid, gradient))
@@ -118,8 +119,8 @@ def test_forces_of_a_rectangular_cell_use_the_spacing_of_each_direction():
 
 
 def test_power_of_the_corner_forces_is_that_of_the_stress():
-    """sigma : D per current volume. The packed shear law is off by up to 1e-8 of its largest tau / tan(gamma / 2), 18 MPa at
-    90 degrees, which is 3e-6 of the stress here."""
+    """sigma : D per current volume. The packed shear law is off by up to 1e-8 of its largest tau / tan(gamma / 2), 18
+    MPa at 90 degrees, which is 3e-6 of the stress here."""
     start = np.array([[1.005, 0.35], [0.1, 1.01]])
     rate = np.array([[0.4, -0.7], [0.3, 0.2]])
     card = FABRIC.card.membrane
@@ -179,7 +180,8 @@ def test_slack_ratio_gives_yarns_a_share_of_their_initial_stiffness():
 
 @pytest.mark.parametrize("direction", [0, 2], ids=["in the plane", "out of the plane"])
 def test_hourglass_mode_of_a_slack_cell_has_stiffness(direction):
-    """With all yarns slack nothing but the control resists: corner forces k V (upper edge - lower edge), k = h E / area.
+    """With all yarns slack nothing but the control resists: corner forces k V (upper edge - lower edge), k = h E /
+    area.
 
     In the plane the mode leaves the mean yarn vectors as they are; out of the plane too.
     """
@@ -198,7 +200,7 @@ def test_hourglass_mode_of_a_slack_cell_has_stiffness(direction):
     np.testing.assert_allclose(forces[0.02], 4.0 * stiffness * mode, atol=1e-10)
 
 
-# -- patches ----------------------------------------------------------------------------------------------------------
+# -- patches ---------------------------------------------------------------------------------------
 
 
 GRADIENTS = {
@@ -224,8 +226,8 @@ def test_affine_positions_are_in_equilibrium_inside_the_patch(grid, gradient):
 def test_affine_edge_makes_the_inside_affine(grid):
     """The edge is stretched and sheared and held; damping brings the inside to rest where the affine map has it.
 
-    The slowest mode decays with half the damping rate (it is under-damped): exp(-0.5 x 4000 x 0.02) = 4e-18 of a few tenths of
-    a millimetre, so what is left is rounding.
+    The slowest mode decays with half the damping rate (it is under-damped): exp(-0.5 x 4000 x 0.02) = 4e-18 of a few
+    tenths of a millimetre, so what is left is rounding.
     """
     gradient = trellis(math.radians(25.0)) @ np.diag([1.003, 1.005])
     nodes = edge_nodes(grid)

@@ -1,4 +1,5 @@
-"""Free and driven patches in time: conservation, energies, objectivity, symmetry, mass scaling, stable step, checkpoints."""
+"""Free and driven patches in time: conservation, energies, objectivity, symmetry, mass scaling, stable step,
+checkpoints."""
 
 from __future__ import annotations
 
@@ -47,12 +48,13 @@ def momenta(simulation):
     return p.sum(axis=(0, 1)), np.cross(simulation.positions, p).sum(axis=(0, 1)), np.abs(p).sum()
 
 
-# -- conservation -------------------------------------------------------------------------------------------------------
+# -- conservation ----------------------------------------------------------------------------------
 
 
 @each_grid
 def test_free_patch_keeps_momentum_and_angular_momentum(grid):
-    """To rounding: n steps add n rounding errors of forces that cancel, 2000 x 1e-16 x (force impulse / momentum ~ 10)."""
+    """To rounding: n steps add n rounding errors of forces that cancel, 2000 x 1e-16 x (force impulse / momentum ~
+    10)."""
     simulation = vibrating(grid)
     before, turning, size = momenta(simulation)
     simulation.advance_to(END)
@@ -80,8 +82,9 @@ def test_translating_patch_flies_straight_and_keeps_its_energy(grid):
 
 @each_grid
 def test_energy_of_a_free_vibration_is_kept(grid):
-    """Velocities are half a step off, so up to sin(omega h / 2) of the exchanged energy, a quarter of all, seems to be missing:
-    omega h / 2 is at most 0.1 at a tenth of the stable step, and little of the motion is in the fastest modes."""
+    """Velocities are half a step off, so up to sin(omega h / 2) of the exchanged energy, a quarter of all, seems to
+    be missing: omega h / 2 is at most 0.1 at a tenth of the stable step, and little of the motion is in the fastest
+    modes."""
     simulation = vibrating(grid, safety=0.1)
     before = simulation.ledger()
     total, exchanged = before.kinetic, 0.0
@@ -96,8 +99,8 @@ def test_energy_of_a_free_vibration_is_kept(grid):
 
 @each_grid
 def test_energy_of_a_vibration_with_slack_yarns_is_kept_with_small_steps(grid):
-    """A yarn that goes slack has a kink in its force, at which central differences gain or lose energy of the order of the
-    step: within 1 % at a tenth of the stable step. (At 0.9 of it the gain needs damping.)"""
+    """A yarn that goes slack has a kink in its force, at which central differences gain or lose energy of the order
+    of the step: within 1 % at a tenth of the stable step. (At 0.9 of it the gain needs damping.)"""
     simulation = free(grid, safety=0.1)
     simulation.velocities = smooth_velocities(grid, 20.0)
     total = simulation.ledger().kinetic
@@ -132,8 +135,8 @@ def test_damping_slows_a_translation_exponentially(grid):
 
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 def test_energy_of_a_driven_stretch_and_shear_cycle_closes(grid):
-    """The edge is stretched and sheared and brought back: work done equals what is stored at every instant within 1 % of the
-    largest work; the cycle gives it back."""
+    """The edge is stretched and sheared and brought back: work done equals what is stored at every instant within 1 %
+    of the largest work; the cycle gives it back."""
     stretch = affine(grid, [[1.006, 0.0], [0.0, 1.008]])
     shear = affine(grid, [[0.98, 0.2], [0.2, 0.98]])
     nodes = edge_nodes(grid)
@@ -155,25 +158,25 @@ def test_energy_of_a_driven_stretch_and_shear_cycle_closes(grid):
 
 @each_grid
 def test_motion_of_a_turned_patch_is_the_turned_motion(grid):
-    """Objectivity of the whole step. Rounding differs; a vibration of 1000 steps amplifies it to far less than 1e-8 mm."""
+    """Objectivity of the whole step. Rounding differs; a vibration of 1000 steps amplifies it to far less than 1e-8
+    mm."""
     turn = rotation([0.3, 1.0, -0.5], 110.0)
     here, there = vibrating(grid), vibrating(grid, turn=turn)
     here.advance_to(0.004)
     there.advance_to(0.004)
     assert here.steps == there.steps
-    np.testing.assert_allclose(
-        there.positions[grid.active], here.positions[grid.active] @ turn.T, atol=1e-8
-    )
+    np.testing.assert_allclose(there.positions[grid.active], here.positions[grid.active] @ turn.T, atol=1e-8)
 
 
-# -- symmetry, mass scaling, settings -------------------------------------------------------------------------------------
+# -- symmetry, mass scaling, settings --------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("degrees", "tolerance"), [(0, 1e-9), (45, 1e-2)])
 def test_quarter_moves_as_the_full_blank(degrees, tolerance):
-    """With motions that have the symmetry of the planes. At 0 degrees sums are made in another order: rounding, amplified over 500
-    steps. At 45 degrees the cells on the planes are cut, and triangles share out mass and strain otherwise than half squares:
-    a difference of the order of a share of a cell row, kept below 1 % of a 0.12 mm motion here."""
+    """With motions that have the symmetry of the planes. At 0 degrees sums are made in another order: rounding,
+    amplified over 500 steps. At 45 degrees the cells on the planes are cut, and triangles share out mass and strain
+    otherwise than half squares: a difference of the order of a share of a cell row, kept below 1 % of a 0.12 mm
+    motion here."""
     length = 2.7 if degrees == 0 else 3.0
     side = 6 * length if degrees == 0 else 2 * length * np.sqrt(2.0)
     outline = rectangle(side, side)
@@ -218,8 +221,8 @@ def test_masses_are_the_areal_weight_and_edge_yarns_are_whole():
 
 @each_grid
 def test_mass_scaling_is_a_change_of_time(grid):
-    """Four times the mass doubles the step; with half the velocities every position is the same number, all factors being
-    powers of two."""
+    """Four times the mass doubles the step; with half the velocities every position is the same number, all factors
+    being powers of two."""
     one, four = free(grid), free(grid, mass_scaling=4.0)
     np.testing.assert_array_equal(four.masses, 4.0 * one.masses)
     velocities = smooth_velocities(grid, 20.0)
@@ -230,14 +233,16 @@ def test_mass_scaling_is_a_change_of_time(grid):
     np.testing.assert_array_equal(four.positions, one.positions)
 
 
-# -- the stable step --------------------------------------------------------------------------------------------------------
+# -- the stable step -------------------------------------------------------------------------------
 
 
 def stretched(grid, safety):
     """A patch with its edge stretched by 0.9 % and held, a little noise inside."""
     nodes = edge_nodes(grid)
     wanted = affine(grid, [[1.009, 0.0], [0.0, 1.009]])
-    simulation = driven(grid, nodes, wanted.reshape(1, -1, 3)[:, nodes], [Motion((0.0, 1e-9), (0.0, 1.0))], safety=safety)
+    simulation = driven(
+        grid, nodes, wanted.reshape(1, -1, 3)[:, nodes], [Motion((0.0, 1e-9), (0.0, 1.0))], safety=safety
+    )
     rng = np.random.default_rng(2)
     put(simulation, grid.flat + wanted + 1e-5 * rng.normal(size=wanted.shape))
     simulation.last = simulation._survey()
@@ -248,8 +253,9 @@ def stretched(grid, safety):
 
 @pytest.mark.parametrize("grid", [whole_grid(7, 9), bias_grid(3)], ids=["whole", "half"])
 def test_step_is_stable_at_its_limit_and_not_far_above(grid):
-    """At 0.98 of the estimate noise stays noise for 20 000 steps. The estimate bounds the zig-zag of an endless net; a small net with
-    a held edge has its highest mode somewhat lower, so 1.25 must grow: the factor per step is then above 1.5."""
+    """At 0.98 of the estimate noise stays noise for 20 000 steps. The estimate bounds the zig-zag of an endless net;
+    a small net with a held edge has its highest mode somewhat lower, so 1.25 must grow: the factor per step is then
+    above 1.5."""
     calm = stretched(grid, 0.98)
     for _ in range(100):
         calm.advance_to(calm.time + 200 * calm.step)
@@ -264,7 +270,9 @@ def test_step_is_stable_at_its_limit_and_not_far_above(grid):
 def test_blow_up_is_reported_with_step_and_place_and_advice():
     grid = whole_grid()
     simulation = stretched(grid, 1.3)
-    with pytest.raises(UnstableRun, match=r"blew up at step \d+, t = .* s, near the crossing .* mm along warp") as caught:
+    with pytest.raises(
+        UnstableRun, match=r"blew up at step \d+, t = .* s, near the crossing .* mm along warp"
+    ) as caught:
         simulation.advance_to(0.1)
     assert "solver.safety" in caught.value.hint
     assert caught.value.exit_code == 1
@@ -288,7 +296,7 @@ def test_too_many_steps_end_the_run_with_advice():
     assert "most_steps" in caught.value.hint
 
 
-# -- numbers that are none ------------------------------------------------------------------------------------------------
+# -- numbers that are none -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
@@ -315,12 +323,13 @@ def test_subnormal_numbers_do_not_survive_a_step(grid):
     assert np.float64(1e-310) * np.float64(0.5) > 0.0
 
 
-# -- checkpoints ------------------------------------------------------------------------------------------------------------
+# -- checkpoints -----------------------------------------------------------------------------------
 
 
 @each_grid
 def test_restored_run_goes_on_bit_for_bit(grid):
     """Positions, velocities, clock and ledger, although the break falls between two entries of the ledger."""
+
     def start():
         nodes = edge_nodes(grid)
         pull = affine(grid, [[1.001, 0.0], [0.0, 1.002]]).reshape(1, -1, 3)[:, nodes]
@@ -348,7 +357,7 @@ def test_checkpoint_of_another_problem_is_refused():
         free(whole_grid(5, 7)).restore(saved)
 
 
-# -- driven crossings ---------------------------------------------------------------------------------------------------------
+# -- driven crossings ------------------------------------------------------------------------------
 
 
 def test_driven_crossings_follow_their_motion():

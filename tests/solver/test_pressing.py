@@ -40,12 +40,12 @@ def slippery():
     return settled(0.0)
 
 
-# -- normal force -----------------------------------------------------------------------------------------------------------
+# -- normal force ----------------------------------------------------------------------------------
 
 
 def test_pushed_plate_carries_exactly_its_force(slippery):
-    """Upwards from the pushed plate, downwards from the fixed one; the bounce is damped by half of critical, with a period
-    of 2 pi x 20 steps: e^-40 after 20 ms."""
+    """Upwards from the pushed plate, downwards from the fixed one; the bounce is damped by half of critical, with a
+    period of 2 pi x 20 steps: e^-40 after 20 ms."""
     assert slippery.tool_reaction(1) == pytest.approx(FORCE, rel=1e-6)
     assert slippery.tool_reaction(0) == pytest.approx(-FORCE, rel=1e-6)
     assert slippery.tool_reaction(2) == 0.0
@@ -81,13 +81,13 @@ def test_without_friction_nothing_is_tangential(slippery):
     assert there.ledger().friction == 0.0
 
 
-# -- friction ---------------------------------------------------------------------------------------------------------------
+# -- friction --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.4])
 def test_sliding_patch_is_slowed_by_mu_n_on_both_faces(friction):
-    """dp/dt = -2 mu N once the tangential springs are at their limit, after mu x penetration / ratio = 1e-6 mm of sliding. The
-    patch weighs 0.35 mg per newton and mm/s2, so a small force slows it for thousands of steps."""
+    """dp/dt = -2 mu N once the tangential springs are at their limit, after mu x penetration / ratio = 1e-6 mm of
+    sliding. The patch weighs 0.35 mg per newton and mm/s2, so a small force slows it for thousands of steps."""
     simulation = settled(friction, force=LIGHT)
     simulation.velocities = np.broadcast_to([100.0, 0.0, 0.0], (*WHOLE.shape, 3)).copy()
     simulation.advance_to(SETTLED + 0.0002)
@@ -113,9 +113,9 @@ def test_sliding_force_points_against_the_sliding():
 
 
 def test_below_the_limit_the_patch_sticks_and_no_heat_is_made():
-    """A push too weak for the springs' limit: the patch swings about its place. 5 mm/s against k_t = 0.5 x 30 N/mm3 on two faces
-    and 6e-10 t/mm2 swings by v sqrt(m / 2 k_t) = 2e-5 mm, some crossings by a few times that as the fabric between them springs; the limit is at
-    0.2 x penetration / 0.5 = 9e-4 mm."""
+    """A push too weak for the springs' limit: the patch swings about its place. 5 mm/s against k_t = 0.5 x 30 N/mm3
+    on two faces and 6e-10 t/mm2 swings by v sqrt(m / 2 k_t) = 2e-5 mm, some crossings by a few times that as the
+    fabric between them springs; the limit is at 0.2 x penetration / 0.5 = 9e-4 mm."""
     simulation = settled(0.2)
     start = simulation.positions
     heat = simulation.ledger().friction
@@ -129,7 +129,8 @@ def test_below_the_limit_the_patch_sticks_and_no_heat_is_made():
 
 
 def test_friction_comes_to_rest_and_stays():
-    """A sliding patch stops after v^2 m / (4 mu N) and does not creep. What swings on the springs is below their limit, 2e-6 mm."""
+    """A sliding patch stops after v^2 m / (4 mu N) and does not creep. What swings on the springs is below their
+    limit, 2e-6 mm."""
     simulation = settled(0.4, force=LIGHT)
     start = simulation.positions[..., 0].mean()
     simulation.velocities = np.broadcast_to([50.0, 0.0, 0.0], (*WHOLE.shape, 3)).copy()
@@ -141,7 +142,7 @@ def test_friction_comes_to_rest_and_stays():
     assert simulation.positions[..., 0].mean() == pytest.approx(place, abs=1e-5)
 
 
-# -- curved tools -----------------------------------------------------------------------------------------------------------
+# -- curved tools ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0], ids=["below", "above"])
@@ -156,8 +157,12 @@ def test_hemisphere_pushes_away_from_its_centre(up):
     here = centre + (grid.flat - centre) / radius * (25.0 + THICKNESS / 2 - depth)
     put(simulation, here)
     simulation.last = simulation._survey()
-    expected = 30.0 * grid.node_area[..., None] * depth * (here - centre) / np.linalg.norm(
-        here - centre, axis=-1, keepdims=True
+    expected = (
+        30.0
+        * grid.node_area[..., None]
+        * depth
+        * (here - centre)
+        / np.linalg.norm(here - centre, axis=-1, keepdims=True)
     )
     np.testing.assert_allclose(simulation.contact_forces, expected, atol=1e-9)
     assert simulation.penetration == pytest.approx(0.02, rel=1e-9)
@@ -174,7 +179,7 @@ def test_hemisphere_pushes_away_from_its_centre(up):
     assert simulation.tool_reaction(0) == pytest.approx(expected[..., 2].sum(), rel=1e-9)
 
 
-# -- bands --------------------------------------------------------------------------------------------------------------------
+# -- bands -----------------------------------------------------------------------------------------
 
 
 def dome(grid, threads):
@@ -199,7 +204,9 @@ def dome(grid, threads):
     return simulation
 
 
-@pytest.mark.parametrize("grid", [pytest.param(whole_grid(10, 13), marks=pytest.mark.slow), bias_grid(7)], ids=["whole", "half"])
+@pytest.mark.parametrize(
+    "grid", [pytest.param(whole_grid(10, 13), marks=pytest.mark.slow), bias_grid(7)], ids=["whole", "half"]
+)
 def test_result_is_the_same_bit_for_bit_with_1_2_and_3_bands(grid):
     """Also with more bands than processors."""
     one = dome(grid, 1)

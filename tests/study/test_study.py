@@ -17,7 +17,12 @@ HEMISPHERE = shipped_studies()["hemisphere-0-90"].read_text()
 UNBALANCED = {
     "fabric.override": {
         "tension": {
-            "weft": {"law": "linear", "stiffness_N_per_mm": 50.0, "specimen_length_mm": 150.0, "specimen_width_mm": 50.0}
+            "weft": {
+                "law": "linear",
+                "stiffness_N_per_mm": 50.0,
+                "specimen_length_mm": 150.0,
+                "specimen_width_mm": 50.0,
+            }
         }
     }
 }
@@ -45,7 +50,7 @@ def refused(source, changes=(), error=StudyError):
     return caught.value
 
 
-# -- what is accepted ---------------------------------------------------------------------------------------------------------
+# -- what is accepted ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", shipped_studies())
@@ -105,7 +110,9 @@ def test_card_next_to_the_study_is_found_and_made_absolute(tmp_path):
 
 
 def test_changes_replace_values_and_may_add_keys():
-    study = Study.load("hemisphere-0-90", ["blank.warp_angle_deg=90", "solver.safety = 0.5", "name=other", 'description="x = y"'])
+    study = Study.load(
+        "hemisphere-0-90", ["blank.warp_angle_deg=90", "solver.safety = 0.5", "name=other", 'description="x = y"']
+    )
     assert study.model.blank.warp_angle_deg == 90.0
     assert study.model.solver.safety == 0.5
     assert study.name == "other"
@@ -120,7 +127,11 @@ def test_outlines_of_other_kinds():
     assert "width_mm has no meaning" in error.message
     study = Study.load(shipped_studies()["hemisphere-0-90"], [])
     model = study.model.model_copy(
-        update={"blank": study.model.blank.model_copy(update={"outline": "disc", "width_mm": None, "height_mm": None, "diameter_mm": 150.0})}
+        update={
+            "blank": study.model.blank.model_copy(
+                update={"outline": "disc", "width_mm": None, "height_mm": None, "diameter_mm": 150.0}
+            )
+        }
     )
     made = Study(model, study.file)
     made.check()
@@ -139,10 +150,19 @@ def test_symmetry_at_45_degrees_is_for_balanced_fabrics_only():
     assert Study.load("hemisphere-0-90", coarse).grid.copies == 4
 
 
-# -- bad values --------------------------------------------------------------------------------------------------------------
+# -- bad values ------------------------------------------------------------------------------------
 
 
-SIZES = ["width_mm", "height_mm", "cell_length_mm", "diameter_mm", "hole_diameter_mm", "force_N", "stroke_mm", "duration_s"]
+SIZES = [
+    "width_mm",
+    "height_mm",
+    "cell_length_mm",
+    "diameter_mm",
+    "hole_diameter_mm",
+    "force_N",
+    "stroke_mm",
+    "duration_s",
+]
 
 
 @pytest.mark.parametrize("key", SIZES)
@@ -248,7 +268,7 @@ def test_tools_that_make_no_sense_are_refused(changes, words):
     assert words in refused("hemisphere-0-90", changes).message
 
 
-# -- bad geometry ----------------------------------------------------------------------------------------------------------------
+# -- bad geometry ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("sizes", [(60.0, 60.0), (150.0, 66.0), (67.4, 150.0)])
@@ -314,7 +334,7 @@ def test_polygon_that_crosses_itself_is_refused(tmp_path):
     assert "not a simple outline" in error.message
 
 
-# -- bad cards -----------------------------------------------------------------------------------------------------------------
+# -- bad cards -------------------------------------------------------------------------------------
 
 
 def test_card_whose_tension_is_not_monotone_is_refused_with_the_reason():
@@ -338,7 +358,7 @@ def test_bad_card_is_refused(changes, words):
     assert words in refused("hemisphere-0-90", changes, CardError).message
 
 
-# -- bad files -----------------------------------------------------------------------------------------------------------------
+# -- bad files -------------------------------------------------------------------------------------
 
 
 def test_missing_file_is_refused_with_what_lies_near(tmp_path):
