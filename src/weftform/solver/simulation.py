@@ -386,7 +386,7 @@ class Simulation:
             import numba
 
             # more bands than processors wait for each other; the result is the same
-            numba.set_num_threads(min(self.bands, numba.config.NUMBA_NUM_THREADS))
+            numba.set_num_threads(min(self.bands, int(vars(numba.config)["NUMBA_NUM_THREADS"])))
         return int(
             self._loop(
                 self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self.columns,
