@@ -6,7 +6,7 @@ import difflib
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -76,12 +76,18 @@ def line_of(text: str, location: tuple[str | int, ...]) -> int | None:
 def known_keys(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
     """Names allowed at a place of a declared model; empty where the place cannot be resolved."""
     current: Any = model
+    named = False
     for part in location:
         if isinstance(part, int):
+            continue
+        if named:
+            # a name that the file chooses, such as that of a tool
+            named = False
             continue
         fields = getattr(current, "model_fields", None)
         if fields is None or part not in fields:
             return []
+        named = get_origin(fields[part].annotation) is dict
         current = _model_in(fields[part].annotation)
         if current is None:
             return []

@@ -16,8 +16,8 @@ from weftform.cases import Case, case_of
 from weftform.errors import ResultError, StudyError, UnstableRun
 from weftform.result import Result
 from weftform.result.fields import Fields
-from weftform.result.writer import ResultWriter, claim_folder, write_whole
-from weftform.solver import Ledger, Simulation
+from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
+from weftform.solver import Ledger, Simulation, survey
 from weftform.study import Study
 
 MOST_IMBALANCE = 0.01
@@ -155,6 +155,7 @@ class Run:
             watch(Progress(0.0, 0.0, 0, 0.0, math.nan, compiling=True))
         self.simulation = Simulation(case.problem(), threads)
         self.rows: list[dict[str, float]] = []
+        self._last_sound = self._fields()
         self.peak_penetration = 0.0
         self.wall = 0.0
         self._forces: list[float] = []
@@ -166,7 +167,7 @@ class Run:
 
     def go(self) -> None:
         """March through the outputs, keep what is computed whatever happens."""
-        study, simulation = self.study, self.simulation
+        study = self.study
         output = study.model.output
         case = self.case
         if self._resume:
@@ -182,7 +183,7 @@ class Run:
         self._last_report = 0.0
         try:
             for stop in stops:
-                if stop < simulation.time * (1 - 1e-9) or (self._resume and stop <= self._resumed_to):
+                if self._resume and stop <= self._resumed_to:
                     continue
                 self._march(float(stop))
                 if stop in rows_at:
@@ -255,6 +256,7 @@ class Run:
         n = self.grid.copies
         force = float(np.mean(self._forces)) if self._forces else self.case.force(simulation)
         self._forces.clear()
+        self._last_sound = fields
         row = {
             "time_s": simulation.time,
             "displacement_mm": self.displacement,
@@ -280,19 +282,22 @@ class Run:
     # -- the end ----------------------------------------------------------------------------------------------------
 
     def _finish(self, writer: ResultWriter, status: str) -> None:
-        sound = bool(np.isfinite(self.simulation.positions).all())
-        if status != "done" and sound:
+        if status != "done" and self._sound:
             writer.row(self._enter_row())
             self._frame(writer)
             self._checkpoint(self.simulation.time)
-        if sound:
-            writer.outline(self._fields())
-        writer.summary(self.summary(status, sound))
+        writer.outline(self._last_sound)
+        writer.summary(self.summary(status))
 
-    def summary(self, status: str, sound: bool) -> dict[str, Any]:
-        """What ``summary.json`` says; after a blow-up without the values that have no meaning."""
+    @property
+    def _sound(self) -> bool:
+        """Whether the state is one of a run that has not blown up."""
+        return bool(self.simulation.last[survey.FINITE])
+
+    def summary(self, status: str) -> dict[str, Any]:
+        """What ``summary.json`` says; after a blow-up of the last sound state."""
         study, grid, simulation = self.study, self.grid, self.simulation
-        fields = self._fields()
+        fields = self._last_sound
         energy = energy_summary(self.rows)
         warnings = self._warnings(energy)
         values: dict[str, Any] = {
@@ -307,13 +312,13 @@ class Run:
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
             "energy": energy,
-            "shear_angle_deg": fields.shear_statistics() if sound else None,
+            "shear_angle_deg": fields.shear_statistics(),
             "penetration_mm": self.peak_penetration,
             "penetration_share_of_thickness": self.peak_penetration / study.fabric.thickness,
             "mass_scaling": study.model.solver.mass_scaling * simulation.largest_inertia,
             "blank": blank_summary(study),
         }
-        if sound and self.rows:
+        if self.rows:
             values.update(self.case.summary(self.rows, fields))
         return values
 
@@ -356,6 +361,7 @@ class Run:
                 self.simulation.restore({k: data[k] for k in data.files})
                 self.rows = [dict(zip(self.columns, (float(v) for v in row), strict=True)) for row in data["history"]]
                 self._resumed_to, self.peak_penetration, self.wall = (float(v) for v in data["progress"])
+                self._last_sound = self._fields()
         except (OSError, ValueError, KeyError) as problem:
             raise ResultError(
                 f"the checkpoint does not belong to this study ({problem})",
@@ -405,7 +411,7 @@ def _versions() -> str:
     from weftform import __version__
 
     return (
-        f"resolved by weftform {__version__} (Python {platform.python_version()}, numpy {np.__version__}, "
+        f"{RESOLVED} {__version__} (Python {platform.python_version()}, numpy {np.__version__}, "
         f"numba {numba.__version__}, scipy {scipy.__version__}, h5py {h5py.__version__})\n"
         "every default is written out: `weftform run` on this file repeats the run"
     )

@@ -323,8 +323,14 @@ def build_grid(
             hint='use symmetry = "full"',
         )
     u0, v0, u1, v1 = shapes.bounds_along(outline, warp_angle)
-    if (u1 - u0) * (v1 - v0) / cell_length**2 > 4.0 * LARGEST_GRID:
-        _too_many((u1 - u0) * (v1 - v0) / cell_length**2)
+    part = shapes.kept_part(outline, planes)
+    x0, y0, x1, y1 = outline.bounds
+    shortest = min(u1 - u0, v1 - v0, x1 - x0, y1 - y0)
+    if cell_length > shortest * (1.0 + 1e-9):
+        _no_cell(cell_length)
+    # whole and half cells cover the area, so there are at least this many; an area is known without laying them out
+    if part.area / cell_length**2 > 1.2 * LARGEST_GRID:
+        _too_many(part.area / cell_length**2)
     along = across = cell_length
     centre = (0.0, 0.0)
     if fitted and aligned and not along_bias:
@@ -333,13 +339,16 @@ def build_grid(
         # The first line lies on the edge of the outline, so the centre of the press may lie between crossings.
         centre = (-u0 / along, -v0 / across)
     elif fitted and along_bias:
-        x0, y0, x1, y1 = outline.bounds
         along = across = shapes.fit_along_bias(x1 - x0, y1 - y0, cell_length, bool(planes))
         start = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         c, s = math.cos(warp_angle), math.sin(warp_angle)
         middle = (c * start[0] + s * start[1], -s * start[0] + c * start[1])
-        centre = (-middle[0] / along, -middle[1] / across)
-    part = shapes.kept_part(outline, planes)
+        # The corners are crossings. With an odd number of half diagonals from the middle to a corner the middle is none.
+        diagonals = round((x1 - x0) / (math.sqrt(2.0) * along)) + round((y1 - y0) / (math.sqrt(2.0) * along))
+        shift = 0.5 * (diagonals % 2)
+        centre = (shift - middle[0] / along, shift - middle[1] / across)
+    if part.area / (along * across) > LARGEST_GRID:
+        _too_many(part.area / (along * across))
     u0, v0, u1, v1 = shapes.bounds_along(part, warp_angle)
     tolerance = 1e-6
     first_i = math.floor(centre[0] + u0 / along + tolerance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -38,16 +39,11 @@ def reproduce(
         typer.echo(found.to_json())
     else:
         console = Console(width=None if Console().is_terminal else 160)
-        section = ""
-        for item in found.items:
-            if item.section != section:
-                if section:
-                    console.print(table)
-                section = item.section
-                table = Table(*HEADER, title=section, title_justify="left", expand=True)
-            cells = item.cells()
-            table.add_row(*cells, style="red" if item.agrees is False else None)
-        console.print(table)
+        for section, members in groupby(found.items, key=lambda item: item.section):
+            table = Table(*HEADER, title=section, title_justify="left", expand=True)
+            for item in members:
+                table.add_row(*item.cells(), style="red" if item.agrees is False else None)
+            console.print(table)
         typer.echo(f"report     {out / 'reproduction.md'} ({found.seconds:.0f} s)")
         for item in found.disagreeing:
             typer.secho(f"disagrees  {item.what}", fg="red", err=True)

@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+# strict: a text or a truth value is no number, even where it could be read as one
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 
 
 class Declared(BaseModel):
@@ -104,7 +105,7 @@ class ShearTable(Declared):
     modulus_MPa: NotNegative | None = None
     shear_angle_deg: list[Finite] | None = None
     values: list[Finite] | None = None
-    valid_to_deg: Annotated[float, Field(gt=0, le=90, allow_inf_nan=False)] = 90.0
+    valid_to_deg: Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)] = 90.0
     source: str = ""
 
     @model_validator(mode="after")

@@ -90,8 +90,13 @@ def _shear_force(results: Results) -> Figure:
     angle = np.linspace(0.0, 45.0, 300)
     axes.plot(angle, results["bias"].fabric.normalised_shear_force(np.radians(angle)), label="Eq. 8")
     frame = results["picture-frame"].history
-    axes.plot(frame["shear_angle_frame_deg"][::6], frame["normalised_shear_force_N_per_mm"][::6], "o", ms=4,
-              label="computed picture frame")  # fmt: skip
+    axes.plot(
+        frame["shear_angle_frame_deg"][::6],
+        frame["normalised_shear_force_N_per_mm"][::6],
+        "o",
+        ms=4,
+        label="computed picture frame",
+    )
     axes.axvline(38.0, color="grey", lw=0.8, ls=":", label="locking angle of the paper, 38 deg")
     axes.legend()
     return figure
@@ -122,8 +127,14 @@ def _strip(results: Results) -> Figure:
     for run, marker in (("tensile-1", "o"), ("tensile-2.5", "s"), ("tensile-5", "^")):
         history = results[run].history
         every = max(len(history["force_N"]) // 14, 1)
-        axes.plot(history["displacement_mm"][::every], history["force_N"][::every], marker, ms=5, mfc="none",
-                  label=f"computed, cells of {results[run].grid.warp_pitch:.3g} mm")  # fmt: skip
+        axes.plot(
+            history["displacement_mm"][::every],
+            history["force_N"][::every],
+            marker,
+            ms=5,
+            mfc="none",
+            label=f"computed, cells of {results[run].grid.warp_pitch:.3g} mm",
+        )
     axes.legend()
     return figure
 
@@ -153,7 +164,13 @@ def _thickness(results: Results) -> Figure:
     axes.plot(angle, results["bias"].fabric.normalised_shear_force(np.radians(angle)), color="black", label="Eq. 8")
     for run, marker in (("bias-middle", "o"), ("bias-e0.01", "s"), ("bias-e0.1", "^"), ("bias-e1", "x")):
         found = results[run].summary["normalised_shear_force"]
-        axes.plot(found["shear_angle_deg"][4::6], found["from_eq_5_N_per_mm"][4::6], marker, ms=5, mfc="none",
-                  label=f"e = {results[run].fabric.thickness:g} mm")  # fmt: skip
+        axes.plot(
+            found["shear_angle_deg"][4::6],
+            found["from_eq_5_N_per_mm"][4::6],
+            marker,
+            ms=5,
+            mfc="none",
+            label=f"e = {results[run].fabric.thickness:g} mm",
+        )
     axes.legend()
     return figure

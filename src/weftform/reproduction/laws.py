@@ -31,7 +31,7 @@ def law_items(fabric: Fabric) -> list[Item]:
                 found / thickness,
                 1e-3,
                 remark="Eq. 8 over the thickness of 0.62 mm",
-            )  # fmt: skip
+            )
         )
     for k, (found, printed) in enumerate(zip(shear, EQ_10, strict=True), 1):
         power = f" of gamma^{k - 1}" if k > 1 else ", constant"
@@ -44,25 +44,40 @@ def law_items(fabric: Fabric) -> list[Item]:
                 k * found / thickness,
                 1e-3,
                 remark="derivative of Eq. 9",
-            )  # fmt: skip
+            )
         )
     grams = 3.9 / 150.0
     lines = fabric.warp.width / 1.0 + 1.0
     items += [
-        Item(section, "Uc_max for l0 = 1 mm (mm)", "Sec. 3.2", 0.026, grams, 1e-6, remark="Eq. 11: 3.9 mm over N = 150"),
         Item(
-            section, "Fc_max for l0 = 1 mm (N)", "Sec. 3.2", 215.47, float(fabric.warp.force(3.9)) / lines, 1e-3,
+            section, "Uc_max for l0 = 1 mm (mm)", "Sec. 3.2", 0.026, grams, 1e-6, remark="Eq. 11: 3.9 mm over N = 150"
+        ),
+        Item(
+            section,
+            "Fc_max for l0 = 1 mm (N)",
+            "Sec. 3.2",
+            215.47,
+            float(fabric.warp.force(3.9)) / lines,
+            1e-3,
             remark="Eq. 11: repaired Eq. 4 over n + 1 = 51 lines; 215.47 with a0 = -3.446 N, which the card leaves out",
         ),
         Item(
-            section, "kinematic shear angle at 16.55 mm (deg)", "Eq. 2", 21.0,
-            float(np.degrees(kinematic_angle(16.55, HEIGHT, WIDTH))), 1e-2,
+            section,
+            "kinematic shear angle at 16.55 mm (deg)",
+            "Eq. 2",
+            21.0,
+            float(np.degrees(kinematic_angle(16.55, HEIGHT, WIDTH))),
+            1e-2,
         ),
         Item(
-            section, "end of the kinematic range (mm)", "Eq. 2", 100.0 * (np.sqrt(2.0) - 1.0),
-            kinematic_limit(HEIGHT, WIDTH), 1e-9,
+            section,
+            "end of the kinematic range (mm)",
+            "Eq. 2",
+            100.0 * (np.sqrt(2.0) - 1.0),
+            kinematic_limit(HEIGHT, WIDTH),
+            1e-9,
         ),
-    ]  # fmt: skip
+    ]
     angle = np.radians(np.linspace(0.05, 40.0, 2000))
     force = bias_force(angle, shear, HEIGHT, WIDTH)
     back = normalised_shear_force(angle, force, HEIGHT, WIDTH)
@@ -76,7 +91,7 @@ def law_items(fabric: Fabric) -> list[Item]:
                 float(np.interp(np.radians(degrees), angle, back)),
                 5e-3,
                 remark="round trip, point by point",
-            )  # fmt: skip
+            )
         )
     return items
 
@@ -87,32 +102,59 @@ def misprints(fabric: Fabric) -> list[Item]:
     printed = np.polynomial.Polynomial(EQ_4_PRINTED)
     return [
         Item(
-            section, "F(3.9 mm) of Eq. 4 as printed (N)", "Sec. 3.2: 215.47 N x 51 lines", 215.47 * 51.0,
-            float(printed(3.9)), remark="the printed a4 = -170.85 makes the force negative; a4 = -91.645 meets the text",
+            section,
+            "F(3.9 mm) of Eq. 4 as printed (N)",
+            "Sec. 3.2: 215.47 N x 51 lines",
+            215.47 * 51.0,
+            float(printed(3.9)),
+            remark="the printed a4 = -170.85 makes the force negative; a4 = -91.645 meets the text",
         ),
         Item(
-            section, "E ln 2 with the printed E = 34 500 MPa (MPa)", "Table 2", 24500.0, 34500.0 * np.log(2.0),
+            section,
+            "E ln 2 with the printed E = 34 500 MPa (MPa)",
+            "Table 2",
+            24500.0,
+            34500.0 * np.log(2.0),
             remark="the stresses of Table 2 are those of E = 35 400 MPa",
         ),
         Item(
-            section, "kinematic shear angle at 21 mm (deg)", "Sec. 2.4.2: 21 deg", 21.0,
+            section,
+            "kinematic shear angle at 21 mm (deg)",
+            "Sec. 2.4.2: 21 deg",
+            21.0,
             float(np.degrees(kinematic_angle(21.0, HEIGHT, WIDTH))),
             remark="two events: slip at 21 mm is 27.65 deg of kinematic shear",
         ),
         Item(
-            section, "displacement at a kinematic angle of 21 deg (mm)", "Sec. 3.6: 21 mm", 21.0,
-            float(kinematic_displacement(np.radians(21.0), HEIGHT, WIDTH)), remark="likewise",
+            section,
+            "displacement at a kinematic angle of 21 deg (mm)",
+            "Sec. 3.6: 21 mm",
+            21.0,
+            float(kinematic_displacement(np.radians(21.0), HEIGHT, WIDTH)),
+            remark="likewise",
         ),
         Item(
-            section, "C_s(gamma / 2) / F_sh(gamma / 2) at gamma = 30 deg", "formula before Eq. 5: cos(gamma)",
-            float(np.cos(np.radians(30.0))), float(np.cos(np.radians(15.0))), remark="must be cos(gamma / 2); Eq. 5 has it right",
+            section,
+            "C_s(gamma / 2) / F_sh(gamma / 2) at gamma = 30 deg",
+            "formula before Eq. 5: cos(gamma)",
+            float(np.cos(np.radians(30.0))),
+            float(np.cos(np.radians(15.0))),
+            remark="must be cos(gamma / 2); Eq. 5 has it right",
         ),
         Item(
-            section, "imposed displacement of the tensile strip (mm)", "Sec. 3.2: U = 39 mm", 39.0, 3.9,
+            section,
+            "imposed displacement of the tensile strip (mm)",
+            "Sec. 3.2: U = 39 mm",
+            39.0,
+            3.9,
             remark="3.9 mm, as Uc_max = 3.9 / 150 = 0.026 mm says",
         ),
         Item(
-            section, "displacement that the yarns can follow in the bias test (mm)", "Sec. 2.3.1: up to 50 mm", 50.0,
-            kinematic_limit(HEIGHT, WIDTH), remark="beyond it the yarns slip",
+            section,
+            "displacement that the yarns can follow in the bias test (mm)",
+            "Sec. 2.3.1: up to 50 mm",
+            50.0,
+            kinematic_limit(HEIGHT, WIDTH),
+            remark="beyond it the yarns slip",
         ),
-    ]  # fmt: skip
+    ]

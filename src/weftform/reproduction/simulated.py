@@ -19,38 +19,107 @@ def element_items(results: Results) -> list[Item]:
     two = 35400.0 * np.log(2.0)
     root = 0.5 * two
 
-    def add(run: str, what: str, key: str, source: str, reference: float, tolerance: float | None, remark: str = "",
-            absolute: bool = False) -> None:  # fmt: skip
+    def add(
+        run: str,
+        what: str,
+        key: str,
+        source: str,
+        reference: float,
+        tolerance: float | None,
+        remark: str = "",
+        absolute: bool = False,
+    ) -> None:
         value = results[run].summary["element"][key]
         items.append(
             Item("Elementary tests", what, source, reference, value, tolerance, absolute=absolute, remark=remark)
         )
 
     add("element-shear", "test 1: shear angle (deg)", "shear_angle_deg", "Table 2", 45.0, 1e-6)
-    add("element-shear", "test 1: stress along the weft (MPa)", "weft_stress_MPa", "35 400 ln sqrt 2", root, 1e-3,
-        "Table 2 prints 1.23E+04")  # fmt: skip
+    add(
+        "element-shear",
+        "test 1: stress along the weft (MPa)",
+        "weft_stress_MPa",
+        "35 400 ln sqrt 2",
+        root,
+        1e-3,
+        "Table 2 prints 1.23E+04",
+    )
     add("element-shear", "test 1: stress along the warp (MPa)", "warp_stress_MPa", "Table 2", 0.0, 1e-3)
     add("element-tension-shear", "test 2: strain", "warp_log_strain", "Table 2 (0.69): ln 2", float(np.log(2.0)), 1e-6)
     add("element-tension-shear", "test 2: shear angle (deg)", "shear_angle_deg", "Table 2", 45.0, 1e-6)
-    add("element-tension-shear", "test 2: stress along the warp (MPa)", "warp_stress_MPa", "35 400 ln 2", two, 1e-3,
-        "Table 2 prints 2.45E+04")  # fmt: skip
-    add("element-tension-shear", "test 2: stress along the weft (MPa)", "weft_stress_MPa", "35 400 ln sqrt 2", root, 1e-3,
-        "Table 2 prints 1.23E+04")  # fmt: skip
+    add(
+        "element-tension-shear",
+        "test 2: stress along the warp (MPa)",
+        "warp_stress_MPa",
+        "35 400 ln 2",
+        two,
+        1e-3,
+        "Table 2 prints 2.45E+04",
+    )
+    add(
+        "element-tension-shear",
+        "test 2: stress along the weft (MPa)",
+        "weft_stress_MPa",
+        "35 400 ln sqrt 2",
+        root,
+        1e-3,
+        "Table 2 prints 1.23E+04",
+    )
     add("element-tension-rotation", "test 3: stress along the warp (MPa)", "warp_stress_MPa", "35 400 ln 2", two, 1e-3)
     add("element-tension-rotation", "test 3: stress along the weft (MPa)", "weft_stress_MPa", "Table 2", 0.0, 1e-3)
-    add("element-tension-rotation", "test 3: Green-Naghdi xx after the turn (MPa)", "green_naghdi_xx_MPa", "35 400 ln 2",
-        two, 1e-3, "a rigid turn by 90 degrees changes nothing in the turned frame")  # fmt: skip
+    add(
+        "element-tension-rotation",
+        "test 3: Green-Naghdi xx after the turn (MPa)",
+        "green_naghdi_xx_MPa",
+        "35 400 ln 2",
+        two,
+        1e-3,
+        "a rigid turn by 90 degrees changes nothing in the turned frame",
+    )
     add("element-tension-rotation", "test 3: shear angle (deg)", "shear_angle_deg", "Table 2", 0.0, 1e-6, absolute=True)
-    add("element-hybrid", "hybrid, linear connectors: stress along the warp (MPa)", "warp_stress_MPa", "Table 3", 24500.0,
-        1e-3, "two connectors of 12 250 N/mm stretched by 1 mm, and 2.7 MPa of the membrane")  # fmt: skip
-    add("element-hybrid", "hybrid, linear connectors: stress along the weft (MPa)", "weft_stress_MPa",
-        "24 500 (sqrt 2 - 1)", 24500.0 * (np.sqrt(2.0) - 1.0), 1e-3)  # fmt: skip
-    add("element-hybrid", "hybrid, linear connectors: stress along the weft (MPa)", "weft_stress_MPa", "Table 3", 12300.0,
-        None, "linear in displacement gives 10 148 MPa; the printed value needs connectors linear in log strain")  # fmt: skip
-    add("element-hybrid-log", "hybrid, log-strain connectors: stress along the warp (MPa)", "warp_stress_MPa",
-        "35 400 ln 2", two, 1e-3)  # fmt: skip
-    add("element-hybrid-log", "hybrid, log-strain connectors: stress along the weft (MPa)", "weft_stress_MPa",
-        "35 400 ln sqrt 2", root, 1e-3, "Table 3 prints 1.23E+04")  # fmt: skip
+    add(
+        "element-hybrid",
+        "hybrid, linear connectors: stress along the warp (MPa)",
+        "warp_stress_MPa",
+        "Table 3",
+        24500.0,
+        1e-3,
+        "two connectors of 12 250 N/mm stretched by 1 mm, and 2.7 MPa of the membrane",
+    )
+    add(
+        "element-hybrid",
+        "hybrid, linear connectors: stress along the weft (MPa)",
+        "weft_stress_MPa",
+        "24 500 (sqrt 2 - 1)",
+        24500.0 * (np.sqrt(2.0) - 1.0),
+        1e-3,
+    )
+    add(
+        "element-hybrid",
+        "hybrid, linear connectors: stress along the weft (MPa)",
+        "weft_stress_MPa",
+        "Table 3",
+        12300.0,
+        None,
+        "linear in displacement gives 10 148 MPa; the printed value needs connectors linear in log strain",
+    )
+    add(
+        "element-hybrid-log",
+        "hybrid, log-strain connectors: stress along the warp (MPa)",
+        "warp_stress_MPa",
+        "35 400 ln 2",
+        two,
+        1e-3,
+    )
+    add(
+        "element-hybrid-log",
+        "hybrid, log-strain connectors: stress along the weft (MPa)",
+        "weft_stress_MPa",
+        "35 400 ln sqrt 2",
+        root,
+        1e-3,
+        "Table 3 prints 1.23E+04",
+    )
     return items
 
 
@@ -74,7 +143,7 @@ def tensile_items(results: Results) -> list[Item]:
                     float(law.force(u)),
                     _at(results[run], u),
                     1e-2,
-                )  # fmt: skip
+                )
             )
     items.append(
         Item(
@@ -84,7 +153,7 @@ def tensile_items(results: Results) -> list[Item]:
             float(results["tensile-weft"].fabric.weft.force(3.9)),
             _at(results["tensile-weft"], 3.9),
             1e-2,
-        )  # fmt: skip
+        )
     )
     return items
 
@@ -106,7 +175,7 @@ def bias_items(results: Results) -> list[Item]:
                 _at(bias, d),
                 0.05,
                 remark="equilibrium lies below: its zones are not uniform",
-            )  # fmt: skip
+            )
         )
     for d in (30.0, 40.0):
         angle = kinematic_angle(np.array([d]), HEIGHT, WIDTH)
@@ -118,7 +187,7 @@ def bias_items(results: Results) -> list[Item]:
                 float(bias_force(angle, coefficients, HEIGHT, WIDTH)[0]),
                 _at(bias, d),
                 remark="the steep end of Eq. 8 makes the field far from uniform; the fabric slips before",
-            )  # fmt: skip
+            )
         )
     for column, paper in (("shear_angle_zone_b_deg", 20.0), ("shear_angle_zone_c_deg", 8.0)):
         zone = column.split("_")[3].upper()
@@ -130,7 +199,7 @@ def bias_items(results: Results) -> list[Item]:
                 paper,
                 _at(bias, 15.0, column),
                 remark="a measurement on a specimen that slips and is not quite clamped",
-            )  # fmt: skip
+            )
         )
     for column, what in (
         ("shear_angle_centre_deg", "shear angle of the centre"),
@@ -144,7 +213,7 @@ def bias_items(results: Results) -> list[Item]:
                 f"Eq. 2 gives {np.degrees(kinematic_angle(15.0, HEIGHT, WIDTH)):.2f}",
                 None,
                 _at(bias, 15.0, column),
-            )  # fmt: skip
+            )
         )
     for zone in ("b", "c"):
         upper, lower = (_at(bias, 15.0, f"shear_angle_zone_{zone}_{half}_deg") for half in ("upper", "lower"))
@@ -163,7 +232,7 @@ def bias_items(results: Results) -> list[Item]:
                 _at(results["bias-middle"], d),
                 _at(results["bias-slow"], d),
                 0.02,
-            )  # fmt: skip
+            )
         )
     for thickness in ("0.01", "0.1", "1"):
         items.append(
@@ -175,7 +244,7 @@ def bias_items(results: Results) -> list[Item]:
                 _at(results[f"bias-e{thickness}"], 15.0),
                 0.01,
                 remark="moduli scaled with 1 / e",
-            )  # fmt: skip
+            )
         )
     recovered = bias.summary["normalised_shear_force"]
     angles = np.array(recovered["shear_angle_deg"])
@@ -190,7 +259,7 @@ def bias_items(results: Results) -> list[Item]:
                 law,
                 back,
                 remark="Eq. 5 assumes uniform zones and the kinematic angle; see docs/theory/bias-extension.md",
-            )  # fmt: skip
+            )
         )
     constant = results["bias-constant"]
     items.append(
@@ -200,7 +269,7 @@ def bias_items(results: Results) -> list[Item]:
             "Table 4; Fig. 13 gives no number",
             None,
             _at(constant, 20.0),
-        )  # fmt: skip
+        )
     )
     return items
 
@@ -225,7 +294,7 @@ def frame_items(results: Results) -> list[Item]:
             0.0,
             cycle.summary["force_N"] / peak,
             5e-3,
-        )  # fmt: skip
+        )
     )
     return items
 
@@ -249,7 +318,7 @@ def hemisphere_items(results: Results) -> list[Item]:
                     probe.shear_angle_deg,
                     1.0,
                     absolute=True,
-                )  # fmt: skip
+                )
             )
         items += [
             Item(section, "largest shear angle (deg)", "Figs. 15 and 16", None, summary["shear_angle_deg"]["max"]),
@@ -263,7 +332,7 @@ def hemisphere_items(results: Results) -> list[Item]:
                 0.0,
                 summary["energy"]["balance_error"],
                 0.01,
-            ),  # fmt: skip
+            ),
             Item(
                 section,
                 "kinetic over internal energy",
@@ -271,7 +340,7 @@ def hemisphere_items(results: Results) -> list[Item]:
                 0.0,
                 summary["energy"]["kinetic_over_internal"],
                 0.05,
-            ),  # fmt: skip
+            ),
             Item(
                 section, "penetration over thickness", "contact", 0.0, summary["penetration_share_of_thickness"], 0.05
             ),

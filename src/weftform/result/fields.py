@@ -77,16 +77,24 @@ class Fields:
 
     @cached_property
     def node_shear(self) -> Floats:
-        """Mean of the angles at a crossing [rad], shape [rows, columns]; NaN outside the blank."""
+        """Mean of the angles at a crossing [rad], shape [rows, columns]; NaN outside the blank.
+
+        At a tip where only one connector ends it is that of the cells.
+        """
+        met = self._mean_at_crossings(self.corner_shear)
+        cells = self._mean_at_crossings(np.broadcast_to(self.shear_angle, (4, *self.grid.cells.shape)))
+        return np.where(np.isfinite(met), met, np.where(self.grid.active, cells, np.nan))
+
+    def _mean_at_crossings(self, corners: Floats) -> Floats:
+        """Mean over the corners of cells that meet at each crossing, of those that are known."""
         total = np.zeros(self.grid.shape)
         count = np.zeros(self.grid.shape)
         rows, columns = self.grid.cells.shape
-        for values, (di, dj) in zip(self.corner_shear, ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
+        for values, (di, dj) in zip(corners, ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
             known = np.isfinite(values)
             total[dj : dj + rows, di : di + columns] += np.where(known, values, 0.0)
             count[dj : dj + rows, di : di + columns] += known
-        with np.errstate(invalid="ignore"):
-            return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
     def _lines(self, warp: bool) -> tuple[Floats, Floats]:
         """Nominal strain and force [N] of the connectors of one direction."""

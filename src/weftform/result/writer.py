@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 
 OURS = ("study.toml", "summary.json", "history.csv", "fields.vtkhdf", "outline.csv", "checkpoint.npz")
 
+RESOLVED = "resolved by weftform"
+"""How the study of a result folder begins; nobody's own study does."""
+
 
 def claim_folder(folder: Path, *, resume: bool = False) -> None:
     """Create the folder, or clear the former result out of it; anything else in it is left alone.
@@ -37,7 +40,7 @@ def claim_folder(folder: Path, *, resume: bool = False) -> None:
                     hint="a run leaves one only where it was interrupted; run without --resume",
                 )
             return
-        if folder.is_dir() and any(folder.iterdir()) and not (folder / "study.toml").exists():
+        if folder.is_dir() and any(folder.iterdir()) and not _is_result(folder):
             raise ResultError(
                 "the folder holds other files",
                 file=folder,
@@ -57,6 +60,15 @@ def claim_folder(folder: Path, *, resume: bool = False) -> None:
             file=folder,
             hint="choose another with --out",
         ) from None
+
+
+def _is_result(folder: Path) -> bool:
+    """Whether a folder holds a former result; a study that somebody wrote does not make it one."""
+    try:
+        with (folder / "study.toml").open(encoding="utf-8") as file:
+            return file.readline().startswith("# " + RESOLVED)
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 def write_whole(path: Path, text: str) -> None:

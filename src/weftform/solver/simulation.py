@@ -423,7 +423,8 @@ class Simulation:
         if self.bands > 1:
             import numba
 
-            numba.set_num_threads(self.bands)
+            # more bands than processors wait for each other; the result is the same
+            numba.set_num_threads(min(self.bands, int(vars(numba.config)["NUMBA_NUM_THREADS"])))
         return int(
             self._loop(
                 self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self._spans,
@@ -484,6 +485,7 @@ class Simulation:
             "driven": self._driven_state.copy(),
             "tools": self._tool_table.copy(),
             "inertia": np.array([self.largest_inertia, self._inertia_work]),
+            "surveys": np.array([float(self._surveys)]),
         }
 
     def restore(self, saved: dict[str, Floats]) -> None:
@@ -505,6 +507,7 @@ class Simulation:
         self._driven_state[:] = saved["driven"]
         self._tool_table[:] = saved["tools"]
         self.largest_inertia, self._inertia_work = (float(v) for v in saved["inertia"])
+        self._surveys = int(saved["surveys"][0])
         self.last = self._survey()
 
     # -- looking ---------------------------------------------------------------------------------------------------

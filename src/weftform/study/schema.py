@@ -8,10 +8,10 @@ from pydantic import Field, model_validator
 
 from weftform.fabric.card import Declared, Finite, NotNegative, Positive
 
-Ramp = Annotated[float, Field(gt=0, le=0.5, allow_inf_nan=False)]
+Ramp = Annotated[float, Field(strict=True, gt=0, le=0.5, allow_inf_nan=False)]
 """Share of a motion spent gathering speed, and again losing it."""
 
-Coefficient = Annotated[float, Field(ge=0, le=2, allow_inf_nan=False)]
+Coefficient = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
 
 
 class FabricChoice(Declared):
@@ -31,8 +31,8 @@ class BlankTable(Declared):
     diameter_mm: Positive | None = None
     points_mm: list[tuple[Finite, Finite]] | None = Field(default=None, min_length=3)
     cell_length_mm: Positive
-    fit_cells: bool = True
-    warp_angle_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)] = 0.0
+    fit_cells: Annotated[bool, Field(strict=True)] = True
+    warp_angle_deg: Annotated[float, Field(strict=True, ge=-180, le=180, allow_inf_nan=False)] = 0.0
     symmetry: Literal["full", "half-x", "half-y", "quarter"] = "full"
 
     @model_validator(mode="after")
@@ -98,7 +98,7 @@ class ContactTable(Declared):
 
     friction: Coefficient
     stiffness_N_per_mm3: Positive = 30.0
-    tangential_ratio: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 0.5
+    tangential_ratio: Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)] = 0.5
 
 
 class FormingLoading(Declared):
@@ -115,20 +115,20 @@ class FormingLoading(Declared):
 class SolverTable(Declared):
     """Numerical settings."""
 
-    mass_scaling: Annotated[float, Field(ge=1, le=1e6, allow_inf_nan=False)] = 1.0
+    mass_scaling: Annotated[float, Field(strict=True, ge=1, le=1e6, allow_inf_nan=False)] = 1.0
     damping_per_s: NotNegative = 0.0
-    viscosity: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)] = 0.06
+    viscosity: Annotated[float, Field(strict=True, ge=0, le=0.5, allow_inf_nan=False)] = 0.06
     hourglass: NotNegative = 0.01
-    safety: Annotated[float, Field(gt=0, le=0.98, allow_inf_nan=False)] = 0.85
+    safety: Annotated[float, Field(strict=True, gt=0, le=0.98, allow_inf_nan=False)] = 0.85
     least_step_s: NotNegative = 0.0
-    most_steps: Annotated[int, Field(gt=0, le=1_000_000_000)] = 20_000_000
+    most_steps: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 20_000_000
 
 
 class OutputTable(Declared):
     """How often to keep fields and history."""
 
-    frames: Annotated[int, Field(ge=2, le=2000)] = 31
-    rows: Annotated[int, Field(ge=2, le=100_000)] = 301
+    frames: Annotated[int, Field(strict=True, ge=2, le=2000)] = 31
+    rows: Annotated[int, Field(strict=True, ge=2, le=100_000)] = 301
 
 
 class Common(Declared):
@@ -221,7 +221,9 @@ class FrameSpecimen(Declared):
 class FrameLoading(Declared):
     """Shear angles that the frame passes through, one after the other, from zero."""
 
-    shear_angles_deg: list[Annotated[float, Field(gt=-85, lt=85, allow_inf_nan=False)]] = Field(min_length=1)
+    shear_angles_deg: list[Annotated[float, Field(strict=True, gt=-85, lt=85, allow_inf_nan=False)]] = Field(
+        min_length=1
+    )
     duration_s: Positive
     ramp: Ramp = 0.2
 
@@ -245,8 +247,8 @@ class BiaxialSpecimen(Declared):
 class BiaxialLoading(Declared):
     """Nominal strains of warp and weft at the end; their quotient is the biaxial ratio."""
 
-    warp_strain: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)]
-    weft_strain: Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)]
+    warp_strain: Annotated[float, Field(strict=True, ge=0, le=0.5, allow_inf_nan=False)]
+    weft_strain: Annotated[float, Field(strict=True, ge=0, le=0.5, allow_inf_nan=False)]
     duration_s: Positive
     ramp: Ramp = 0.2
 
@@ -279,9 +281,9 @@ class Move(Declared):
     last phase.
     """
 
-    warp_stretch: Annotated[float, Field(gt=0.4, lt=2.5, allow_inf_nan=False)] | None = None
-    shear_angle_deg: Annotated[float, Field(gt=-65, lt=65, allow_inf_nan=False)] | None = None
-    rotation_deg: Annotated[float, Field(ge=-720, le=720, allow_inf_nan=False)] | None = None
+    warp_stretch: Annotated[float, Field(strict=True, gt=0.4, lt=2.5, allow_inf_nan=False)] | None = None
+    shear_angle_deg: Annotated[float, Field(strict=True, gt=-65, lt=65, allow_inf_nan=False)] | None = None
+    rotation_deg: Annotated[float, Field(strict=True, ge=-720, le=720, allow_inf_nan=False)] | None = None
 
     @model_validator(mode="after")
     def _one(self) -> Move:

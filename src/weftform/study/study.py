@@ -182,8 +182,8 @@ class Study:
             )
 
     def _check_tools(self, model: FormingModel) -> None:
-        smallest = min(math.hypot(*point) for point in self.outline.exterior.coords)
-        nearest = self.outline.exterior.distance(_origin())
+        # a blank that does not cover the axis has no edge around the hole at all
+        nearest = self.outline.exterior.distance(_origin()) if self.outline.contains(_origin()) else 0.0
         for name, table in model.tools.items():
             hole = table.hole_diameter_mm
             if hole is None or table.edge_radius_mm is None:
@@ -193,7 +193,7 @@ class Study:
                     f"the blank is smaller than the hole of the {name.replace('_', ' ')}",
                     key="blank",
                     expected=f"an edge more than {0.5 * hole + table.edge_radius_mm:g} mm from the axis everywhere",
-                    got=f"{min(nearest, smallest):g} mm",
+                    got=f"{nearest:g} mm",
                 )
             for other, punch in model.tools.items():
                 if punch.motion != "stroke" or punch.side == table.side or punch.diameter_mm is None:
