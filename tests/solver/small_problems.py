@@ -20,7 +20,7 @@ FABRIC = Fabric.load("hexforce-48600-c1300")
 SMOOTH = Fabric.load("hexforce-48600-c1300", override={"tension": {"warp": {"slack_ratio": 1.0}}})
 """Yarns that push as they pull: no kink at zero elongation, where a yarn that goes slack makes a vibration chaotic."""
 THICKNESS = FABRIC.thickness
-NOBODY = Driven(np.zeros(0, np.int64), np.zeros((1, 0, 3)), (0,), (0,))
+NOBODY = Driven(np.zeros(0, np.int64), np.zeros((0, 3), bool), np.zeros((1, 0, 3)), (0,), (0,))
 STILL = Motion((0.0, 1.0), (0.0, 0.0))
 
 
@@ -44,7 +44,8 @@ def free(grid, fabric=FABRIC, threads=1, **settings):
 def driven(grid, nodes, displacements, motions, fabric=FABRIC, threads=1, **settings):
     """Crossings ``nodes`` (flat indices) driven by ``displacements``, shape [motions, nodes, 3], each times its
     motion."""
-    drive = Driven(np.asarray(nodes), np.asarray(displacements), tuple(range(len(motions))), (0,) * len(motions))
+    held = np.ones((len(nodes), 3), bool)
+    drive = Driven(np.asarray(nodes), held, np.asarray(displacements), tuple(range(len(motions))), (0,) * len(motions))
     return Simulation(
         Problem(grid, fabric, motions=tuple(motions), driven=drive, settings=Settings(**settings)), threads
     )
