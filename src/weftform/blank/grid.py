@@ -158,6 +158,9 @@ class YarnGrid:
         area = np.zeros(self.shape)
         for corner, (di, dj) in enumerate(CORNERS):
             share = np.where(self.cells == Cell.WHOLE, 0.25, np.where(self.cells == Cell.ABSENT, 0.0, 1.0 / 6.0))
+            # half of a whole cell's share on a plane of symmetry, a whole one off it
+            on = self.on_plane[dj : dj + self.cells.shape[0], di : di + self.cells.shape[1]].any(axis=-1)
+            share = np.where(self.mirrors[0] > 0.0, np.where(on, 0.125, 0.25), share)
             for kind, lacked in LACKED.items():
                 if lacked == corner:
                     share = np.where(self.cells == kind, 0.0, share)
@@ -219,6 +222,35 @@ class YarnGrid:
             lower[self.cells == kind] = low
             left[self.cells == kind] = lef
         return lower, left
+
+    @cached_property
+    def mirrors(self) -> tuple[Floats, Floats]:
+        """How the yarn vectors of half cells on planes of symmetry are completed by their mirror images.
+
+        The other half of such a cell is its image ``M``, so the missing warp edge is ``+-M`` of the weft edge that is there: the
+        mean yarn vectors of the whole cell are ``g1 = (w + S f) / 2`` and ``g2 = (f + S w) / 2`` with the edges ``w`` and ``f`` of
+        the half and ``S = +-M``, + where the plane runs from corner 00 to 11 and - where it runs from 10 to 01.
+
+        Returns
+        -------
+        share
+            0.5 where a half cell lies on a plane of symmetry, else 0, shape [rows - 1, columns - 1].
+        signs
+            Diagonal of S, shape [rows - 1, columns - 1, 3].
+        """
+        rows, columns = self.cells.shape
+        share = np.zeros((rows, columns))
+        signs = np.ones((rows, columns, 3))
+        corner = [self.on_plane[dj : dj + rows, di : di + columns] for di, dj in CORNERS]
+        for kind, lacked in LACKED.items():
+            cut = corner[(lacked + 1) % 4] & corner[(lacked + 3) % 4]
+            for axis in (0, 1):
+                here = (self.cells == kind) & cut[..., axis]
+                mirror = np.ones(3)
+                mirror[axis] = -1.0
+                share[here] = 0.5
+                signs[here] = mirror if lacked in (1, 3) else -mirror
+        return share, signs
 
     @cached_property
     def quads(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

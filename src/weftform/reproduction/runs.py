@@ -39,8 +39,8 @@ RUNS: dict[str, tuple[str, tuple[str, ...]]] = {
     "element-hybrid-log": (
         "element-hybrid",
         (
-            "fabric.override.tension.warp.law=log-strain",
-            "fabric.override.tension.warp.stiffness_N_per_mm=35400",
+            'fabric.override.tension.warp={law = "log-strain", stiffness_N_per_mm = 35400.0, specimen_length_mm = 1.0, '
+            "specimen_width_mm = 1.0}",
         ),
     ),
 }

@@ -48,6 +48,10 @@ class Fields:
         warp, weft = self._warp_edges, self._weft_edges
         g1 = (lower * warp[:-1] + (1.0 - lower) * warp[1:]) / self.grid.warp_pitch
         g2 = (left * weft[:, :-1] + (1.0 - left) * weft[:, 1:]) / self.grid.weft_pitch
+        share, signs = self.grid.mirrors
+        if share.any():
+            q = share[..., None]
+            g1, g2 = (1.0 - q) * g1 + q * signs * g2, (1.0 - q) * g2 + q * signs * g1
         return g1, g2
 
     @cached_property

@@ -119,6 +119,9 @@ def enter_ledger(
             g22 = 0.0
             g12 = 0.0
             hourglass = 0.0
+            q = 0.0
+            if half_cells:
+                q = state[n + (edge_weight + 2) * stride]
             for c in range(3):
                 p = c * stride
                 lower = state[n + 1 + p] - state[n + p]
@@ -127,6 +130,10 @@ def enter_ledger(
                 end = state[u + 1 + p] - state[n + 1 + p]
                 g1 = (low * lower + (1.0 - low) * upper) / warp_pitch
                 g2 = (left * start + (1.0 - left) * end) / weft_pitch
+                if q > 0.0:
+                    # completed by its mirror image (blank.grid.mirrors)
+                    sign = state[n + (edge_weight + 3) * stride] / q if c == 2 else membrane[5 + c]
+                    g1, g2 = (1.0 - q) * g1 + q * sign * g2, (1.0 - q) * g2 + q * sign * g1
                 g11 += g1 * g1
                 g22 += g2 * g2
                 g12 += g1 * g2

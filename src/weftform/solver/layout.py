@@ -75,13 +75,13 @@ class Layout:
 
     @property
     def edge_weight(self) -> int:
-        """First of the two fields with the weights of the edges of half cells."""
+        """First of the fields of half cells: weights of the lower and left edge, share of the mirror image, that times sign z."""
         return FIRST_OPTIONAL
 
     @property
     def force(self) -> int:
         """First of the three fields with the internal force, kept where crossings are driven."""
-        return FIRST_OPTIONAL + 2 * self.half_cells
+        return FIRST_OPTIONAL + 4 * self.half_cells
 
     @property
     def tool(self) -> int:

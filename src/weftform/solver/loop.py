@@ -80,7 +80,7 @@ def _mode_amplitude(kind, value):
 @numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
 def _sweep_band(
     state, band, bands, first, last, spans, edge, node, membrane, series,
-    warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
+    warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
     tool_table, poses, touching, reactions, step, last_step, kick, keep, damping, viscosity,
     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
@@ -102,18 +102,18 @@ def _sweep_band(
             begin = spans[r, 2]
             warp_row(
                 state, row + np.uint64(begin), np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride,
-                warp_inverse, viscosity, warp_degree, warp_pieces, warp_law,
+                warp_inverse, viscosity, warp_degree, warp_pieces, warp_law, ends[0],
             )  # fmt: skip
         if r < last:
             begin = spans[r, 4]
             count = np.uint64(spans[r, 5])
             cell_row(
                 state, row + np.uint64(begin), count, edge[begin:], stride, row_length, half_cells, edge_weight,
-                membrane, shear_degree, shear_pieces, shear_law, series,
+                membrane, shear_degree, shear_pieces, shear_law, ends[2], series,
             )  # fmt: skip
             weft_row(
                 state, row + np.uint64(begin), count, edge[begin:], node[begin:], stride, row_length, half_cells,
-                weft_inverse, viscosity, weft_degree, weft_pieces, weft_law,
+                weft_inverse, viscosity, weft_degree, weft_pieces, weft_law, ends[1],
             )  # fmt: skip
         else:
             for k in range(block):
@@ -163,7 +163,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
 
     def advance(
         state, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
-        warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
+        warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
         tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
         density, viscous,
@@ -200,12 +200,12 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
             for h in range(halo_to.shape[0]):
                 source = halo_from[h] * row_length
                 target_row = halo_to[h] * row_length
-                for k in range(3 * stride):
+                for k in range(6 * stride):
                     state[target_row + k] = state[source + k]
             for band in numba.prange(bands):
                 _sweep_band(
                     state, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band], node[band], membrane,
-                    series, warp_law, weft_law, shear_law, warp_inverse, weft_inverse, tool_table, poses, touching,
+                    series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse, tool_table, poses, touching,
                     reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
                     viscous * density * inertia / step,
                     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,

@@ -38,12 +38,13 @@ def row_loop(function: Callable[..., Any]) -> Any:
 
 
 @row_loop
-def warp_row(state, row, count, edge, node, stride, inverse_length, viscosity, degree, pieces, law):
+def warp_row(state, row, count, edge, node, stride, inverse_length, viscosity, degree, pieces, law, ends):
     """Warp connectors of a row, plus what the cells below carried to their upper edges; starts the nodal force."""
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
     weight = row + s * np.uint64(at.WARP_LINE)
+    width, end_slope, slack = ends[0], ends[1], ends[2]
     warp = LEAD
     upper = LEAD + s + s + s + LEAD + LEAD
     weft = LEAD
@@ -54,7 +55,7 @@ def warp_row(state, row, count, edge, node, stride, inverse_length, viscosity, d
         dy = state[y + U1 + i] - state[y + i]
         dz = state[z + U1 + i] - state[z + i]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        pull = connector_force(law[0], degree, pieces, law[2], law[3], law[4], length * inverse_length - 1.0)
+        pull = connector_force(law, degree, pieces, width, end_slope, slack, length * inverse_length - 1.0)
         rate = (
             dx * (state[vx + U1 + i] - state[vx + i])
             + dy * (state[vy + U1 + i] - state[vy + i])
@@ -85,11 +86,12 @@ def cell_row(
     degree,
     pieces,
     law,
+    ends,
     series,
 ):
     """Membrane of the cells between a row and the next: forces on their four edges.
 
-    ``membrane`` = (1 / warp pitch, 1 / weft pitch, E warp, E weft, hourglass stiffness). The force conjugate to
+    ``membrane`` = (1 / warp pitch, 1 / weft pitch, E warp, E weft, hourglass, mirror signs x, y). The force conjugate to
     ``g1`` is ``a11 g1 + a12 g2`` (mechanics.membrane.covariant_forces); one reciprocal serves all five quotients
     of a cell.
     """
@@ -100,6 +102,8 @@ def cell_row(
     volume = row + s * np.uint64(at.VOLUME)
     lower_weight = row + s * np.uint64(edge_weight)
     left_weight = lower_weight + s
+    mirror = left_weight + s
+    mirror_z = mirror + s
     block = s + s + s + LEAD + LEAD
     warp = LEAD
     upper = LEAD + block
@@ -108,6 +112,7 @@ def cell_row(
     e1, e2 = membrane[2], membrane[3]
     i1, i2 = membrane[0], membrane[1]
     stabilise = membrane[4]
+    width, end_slope = ends[0], ends[1]
     for i in range(count):
         lx = state[x + U1 + i] - state[x + i]
         ly = state[y + U1 + i] - state[y + i]
@@ -135,6 +140,22 @@ def cell_row(
         g2x = i2 * (wa * ax + wb * bx)
         g2y = i2 * (wa * ay + wb * by)
         g2z = i2 * (wa * az + wb * bz)
+        if half_cells:
+            # the other half of a cell on a plane of symmetry is its mirror image (blank.grid.mirrors)
+            q = state[mirror + i]
+            rx = q * membrane[5]
+            ry = q * membrane[6]
+            rz = state[mirror_z + i]
+            k1 = 1.0 - q
+            mx = k1 * g1x + rx * g2x
+            my = k1 * g1y + ry * g2y
+            mz = k1 * g1z + rz * g2z
+            g2x = k1 * g2x + rx * g1x
+            g2y = k1 * g2y + ry * g1y
+            g2z = k1 * g2z + rz * g1z
+            g1x = mx
+            g1y = my
+            g1z = mz
         g11 = g1x * g1x + g1y * g1y + g1z * g1z
         g22 = g2x * g2x + g2y * g2y + g2z * g2z
         g12 = g1x * g2x + g1y * g2y + g1z * g2z
@@ -153,7 +174,7 @@ def cell_row(
         y2 = (g22 - 1.0) * p1 * by_pp
         s1 = e1 * y1 * polynomial(series, y1 * y1)
         s2 = e2 * y2 * polynomial(series, y2 * y2)
-        tau = shear_stress(law[0], degree, pieces, law[2], law[3], t)
+        tau = shear_stress(law, degree, pieces, width, end_slope, t)
         v = state[volume + i]
         a12 = v * tau
         a11 = v * (area * s1 - g12 * tau) * (by_product * g22)
@@ -187,7 +208,7 @@ def cell_row(
 
 @row_loop
 def weft_row(
-    state, row, count, edge, node, stride, row_length, half_cells, inverse_length, viscosity, degree, pieces, law
+    state, row, count, edge, node, stride, row_length, half_cells, inverse_length, viscosity, degree, pieces, law, ends
 ):  # fmt: skip
     """Weft connectors between a row and the next, plus the share of the cells on both sides."""
     s = np.uint64(stride)
@@ -195,6 +216,7 @@ def weft_row(
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
     weight = row + s * np.uint64(at.WEFT_LINE)
+    width, end_slope, slack = ends[0], ends[1], ends[2]
     block = s + s + s + LEAD + LEAD
     left = LEAD + block + block
     right = left + (block if half_cells else np.uint64(0)) - U1
@@ -205,7 +227,7 @@ def weft_row(
         dy = state[y + step + i] - state[y + i]
         dz = state[z + step + i] - state[z + i]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        pull = connector_force(law[0], degree, pieces, law[2], law[3], law[4], length * inverse_length - 1.0)
+        pull = connector_force(law, degree, pieces, width, end_slope, slack, length * inverse_length - 1.0)
         rate = (
             dx * (state[vx + step + i] - state[vx + i])
             + dy * (state[vy + step + i] - state[vy + i])

@@ -158,9 +158,10 @@ class Simulation:
         self._series = _log_series()
         # polynomials go to the time loop as tuples: values, not memory, so they cannot overlap what the loop writes
         self._loop_laws = tuple(
-            ((tuple(law[0]) if packed.pieces == 1 else law[0]), *law[1:])
-            for law, packed in zip(self._laws, (warp, weft, shear), strict=True)
+            tuple(law[0]) if packed.pieces == 1 else law[0]
+            for law, packed in zip(self._laws, self._packed, strict=True)
         )
+        self._loop_ends = np.array([law[2:] for law in self._laws])
         self._loop_series = tuple(self._series)
         self.layout = Layout(
             stride=stride_for(self.columns),
@@ -183,6 +184,7 @@ class Simulation:
                 card.warp_modulus_MPa,
                 card.weft_modulus_MPa,
                 stabilise / grid.cell_area,
+                *_mirror_signs(grid),
             ]
         )
         self._lay_out_bands()
@@ -254,7 +256,10 @@ class Simulation:
         fields[:-1, at.VOLUME, : columns - 1] = grid.cell_share * grid.cell_area * fabric.thickness
         if layout.half_cells:
             lower, left = grid.edge_weights
+            mirror, signs = grid.mirrors
             fields[:, layout.edge_weight : layout.edge_weight + 2] = 0.5
+            fields[:-1, layout.edge_weight + 2, : columns - 1] = mirror
+            fields[:-1, layout.edge_weight + 3, : columns - 1] = mirror * signs[..., 2]
             fields[:-1, layout.edge_weight, : columns - 1] = lower
             fields[:-1, layout.edge_weight + 1, : columns - 1] = left
         self._state[self._row_index] = fields
@@ -428,7 +433,7 @@ class Simulation:
         return int(
             self._loop(
                 self._state.reshape(-1), self._bounds, self._halo_to, self._halo_from, self._spans,
-                self._edge, self._node, tuple(self._membrane), self._loop_series, *self._loop_laws,
+                self._edge, self._node, tuple(self._membrane), self._loop_series, *self._loop_laws, self._loop_ends,
                 self._membrane[0], self._membrane[1],
                 self._tool_table, self._poses, self._touching, self._reactions,
                 self._motion_times, self._motion_values, self._motion_knots, settings.ramp,
@@ -610,6 +615,13 @@ class Simulation:
             damping=float(entry[energies.DAMPED] + tools[:, loop.P_DAMPED].sum()),
             work=float(tools[:, loop.P_WORK].sum() + self.clock[loop.C_DRIVE_WORK]) + self._inertia_work,
         )
+
+
+def _mirror_signs(grid: YarnGrid) -> tuple[float, float]:
+    """Signs along x and y of the mirror images of half cells, the same on both planes of symmetry (1, 1 without)."""
+    share, signs = grid.mirrors
+    found = signs[share > 0.0]
+    return (float(found[0, 0]), float(found[0, 1])) if len(found) else (1.0, 1.0)
 
 
 def _law_arguments(law: PiecewiseLaw, slack_ratio: float) -> tuple[Floats, Floats, float, float, float]:
