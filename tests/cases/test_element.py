@@ -13,6 +13,8 @@ E = 35400.0
 HYBRID_LOG = {
     "fabric.override.tension.warp.law": "log-strain",
     "fabric.override.tension.warp.stiffness_N_per_mm": 35400.0,
+    "fabric.override.tension.warp.specimen_length_mm": 1.0,
+    "fabric.override.tension.warp.specimen_width_mm": 1.0,
 }
 
 

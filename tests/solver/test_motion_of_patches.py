@@ -85,7 +85,7 @@ def test_energy_of_a_free_vibration_is_kept(grid):
     """Velocities are half a step off, so up to sin(omega h / 2) of the exchanged energy, a quarter of all, seems to
     be missing: omega h / 2 is at most 0.1 at a tenth of the stable step, and little of the motion is in the fastest
     modes."""
-    simulation = vibrating(grid, safety=0.1)
+    simulation = vibrating(grid, safety=0.1, viscosity=0.0)
     before = simulation.ledger()
     total, exchanged = before.kinetic, 0.0
     for stop in np.linspace(0.0, END, 41)[1:]:
@@ -100,8 +100,8 @@ def test_energy_of_a_free_vibration_is_kept(grid):
 @each_grid
 def test_energy_of_a_vibration_with_slack_yarns_is_kept_with_small_steps(grid):
     """A yarn that goes slack has a kink in its force, at which central differences gain or lose energy of the order
-    of the step: within 1 % at a tenth of the stable step. (At 0.9 of it the gain needs damping.)"""
-    simulation = free(grid, safety=0.1)
+    of the step: within 1 % at a tenth of the stable step. (Near it the gain needs the viscosity.)"""
+    simulation = free(grid, safety=0.1, viscosity=0.0)
     simulation.velocities = smooth_velocities(grid, 20.0)
     total = simulation.ledger().kinetic
     for stop in np.linspace(0.0, END, 11)[1:]:
@@ -113,11 +113,39 @@ def test_energy_of_a_vibration_with_slack_yarns_is_kept_with_small_steps(grid):
 
 @each_grid
 def test_damping_takes_the_energy_that_the_ledger_says(grid):
-    simulation = vibrating(grid, damping=300.0)
+    simulation = vibrating(grid, damping=300.0, viscosity=0.0)
     total = simulation.ledger().kinetic
     simulation.advance_to(END)
     now = simulation.ledger()
     assert now.damping > 0.5 * total
+    assert abs(now.kinetic + now.internal + now.damping - total) < 0.01 * total
+
+
+@each_grid
+def test_viscosity_takes_the_energy_of_yarns_that_go_slack_and_tight(grid):
+    """At the default step and viscosity: noise never gains energy, and decays."""
+    simulation = free(grid)
+    rng = np.random.default_rng(3)
+    simulation.velocities = 20.0 * rng.normal(size=(*grid.shape, 3)) * grid.active[..., None] * [1.0, 1.0, 0.0]
+    total = simulation.ledger().kinetic
+    energies = []
+    for stop in np.linspace(0.0, END, 11)[1:]:
+        simulation.advance_to(stop)
+        now = simulation.ledger()
+        energies.append(now.kinetic + now.internal)
+        assert now.damping > 0.0
+    assert max(energies) < 1.01 * total
+    assert energies[-1] < 0.5 * total
+
+
+@pytest.mark.xfail(
+    strict=True, reason="the ledger's heat of the dashpots is too large for fast modes (6 % of all here)"
+)
+def test_heat_of_the_viscosity_closes_the_ledger():
+    simulation = vibrating(GRIDS["whole"], damping=300.0)
+    total = simulation.ledger().kinetic
+    simulation.advance_to(END)
+    now = simulation.ledger()
     assert abs(now.kinetic + now.internal + now.damping - total) < 0.01 * total
 
 
@@ -241,7 +269,7 @@ def stretched(grid, safety):
     nodes = edge_nodes(grid)
     wanted = affine(grid, [[1.009, 0.0], [0.0, 1.009]])
     simulation = driven(
-        grid, nodes, wanted.reshape(1, -1, 3)[:, nodes], [Motion((0.0, 1e-9), (0.0, 1.0))], safety=safety
+        grid, nodes, wanted.reshape(1, -1, 3)[:, nodes], [Motion((0.0, 1e-9), (0.0, 1.0))], safety=safety, viscosity=0.0
     )
     rng = np.random.default_rng(2)
     put(simulation, grid.flat + wanted + 1e-5 * rng.normal(size=wanted.shape))

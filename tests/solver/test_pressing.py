@@ -172,7 +172,6 @@ def test_hemisphere_pushes_away_from_its_centre(up):
     tools = (ball(up, away=500.0), *tools[1:])
     without = Simulation(Problem(grid, FABRIC, tools, (STILL, STILL), stroke=0, holding=1, settings=Settings()))
     put(without, here)
-    without.clock[:] = 0.0
     without._choose_step()
     alone = first_forces(without)
     np.testing.assert_allclose(with_ball - alone, expected, atol=1e-9)
