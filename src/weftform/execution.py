@@ -25,7 +25,7 @@ MOST_IMBALANCE = 0.01
 MOST_KINETIC = 0.05
 """Largest share of kinetic in internal energy once the fabric is loaded."""
 LOADED_FROM = 0.01
-"""The fabric counts as loaded once its internal energy exceeds this share of its final value."""
+"""The fabric counts as loaded once its internal energy exceeds this share of its largest value."""
 MOST_PENETRATION = 0.05
 """Largest penetration into a tool as a share of the thickness."""
 CELLS_PER_THREAD = 1500
@@ -216,7 +216,8 @@ class Run:
         self.simulation.compile()
 
     def _look(self, simulation: Simulation) -> None:
-        self._forces.append(self.case.force(simulation))
+        if self.case.noisy_force:
+            self._forces.append(self.case.force(simulation))
         self.peak_penetration = max(self.peak_penetration, simulation.penetration)
         now = time.perf_counter()
         if self.watch is not None and now - self._last_report > 0.1:
@@ -249,7 +250,7 @@ class Run:
         writer.frame(self.simulation.time, self.displacement, self._fields(), self.simulation.contact_forces)
 
     def _enter_row(self) -> dict[str, float]:
-        """A row of the history; forces are means over the time since the last row."""
+        """A row of the history."""
         simulation = self.simulation
         ledger: Ledger = simulation.ledger()
         fields = self._fields()
@@ -376,7 +377,8 @@ def energy_summary(rows: list[dict[str, float]]) -> dict[str, float]:
         return {"balance_error": 0.0, "kinetic_over_internal": 0.0}
     work = max(abs(row["external_work_mJ"]) for row in rows)
     final = rows[-1]
-    loaded = [row for row in rows if row["internal_energy_mJ"] > LOADED_FROM * final["internal_energy_mJ"] > 0.0]
+    most = max(row["internal_energy_mJ"] for row in rows)
+    loaded = [row for row in rows if row["internal_energy_mJ"] > LOADED_FROM * most > 0.0]
     return {
         "balance_error": max(abs(row["imbalance_mJ"]) for row in rows) / work if work > 0.0 else 0.0,
         "kinetic_over_internal": max(

@@ -25,6 +25,9 @@ class Case(ABC):
         A study of the kind.
     """
 
+    noisy_force = False
+    """Whether contact makes the force flutter, so that a row of the history holds its mean since the row before."""
+
     columns: tuple[str, ...] = ()
     """Columns of ``history.csv`` beyond those of every study, see :mod:`weftform.execution`."""
 
@@ -53,7 +56,7 @@ class Case(ABC):
 
     @abstractmethod
     def force(self, simulation: Simulation) -> float:
-        """Force now on the punch or the moving clamp [N], of the whole blank; averaged between rows of the history."""
+        """Force now on the punch or the moving clamp [N], of the whole blank."""
 
     def row(self, simulation: Simulation, fields: Fields, force: float) -> Row:
         """Values of :attr:`columns` at an instant."""

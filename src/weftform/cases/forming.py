@@ -16,6 +16,7 @@ from weftform.study.study import Study
 class Forming(Case):
     """A blank between rigid tools (Sec. 4)."""
 
+    noisy_force = True
     columns = ("holder_displacement_mm", "holder_reaction_N", "penetration_mm")
 
     def __init__(self, study: Study) -> None:

@@ -43,18 +43,18 @@ class Item:
         """Computed minus reference, relative unless ``absolute`` or the reference is zero."""
         if self.reference is None:
             return None
-        change = self.computed - self.reference
-        return change if self.absolute or self.reference == 0.0 else change / self.reference
+        change = float(self.computed) - float(self.reference)
+        return change if self.absolute or self.reference == 0.0 else change / float(self.reference)
 
     @property
     def agrees(self) -> bool | None:
         """Whether it agrees; None where it need not."""
         if self.tolerance is None or self.difference is None:
             return None
-        return abs(self.difference) <= self.tolerance
+        return bool(abs(self.difference) <= self.tolerance)
 
     def as_dict(self) -> dict[str, Any]:
-        return {**self.__dict__, "difference": self.difference, "agrees": self.agrees}
+        return {**self.__dict__, "computed": float(self.computed), "difference": self.difference, "agrees": self.agrees}
 
     def cells(self) -> tuple[str, str, str, str, str]:
         """Item, reference, computed, difference and remark as text."""

@@ -341,6 +341,8 @@ class Simulation:
             self._driven_state[:, c] = self._state[local, at.POSITION + c, column]
             held = driven.held[:, c]
             self._state[local[held], at.INVERSE_MASS + c, column[held]] = 0.0
+        # a prescribed crossing takes its inertia and damping from the machine that moves it, not from the fabric's ledger
+        self._state[local, at.INERTIA, column] = 0.0
         self._driven_held = np.ascontiguousarray(driven.held)
         self._driven_modes = np.ascontiguousarray(driven.modes)
         self._mode_motion = np.asarray(driven.motions, np.int64)
@@ -375,7 +377,8 @@ class Simulation:
     def _kinetic_energy(self) -> float:
         """Kinetic energy of the fabric [mJ]."""
         speeds = np.einsum("jik,jik->ji", self.velocities, self.velocities)
-        return 0.5 * self.density * float(self.clock[loop.C_INERTIA]) * float((self.inertia_area * speeds).sum())
+        inertia = self._state[self._row_index, at.INERTIA, : self.columns]
+        return 0.5 * self.density * float(self.clock[loop.C_INERTIA]) * float((inertia * speeds).sum())
 
     def _choose_holder_mass(self) -> None:
         area = float(self.problem.grid.node_area.sum())
