@@ -10,6 +10,7 @@ from weftform.cli.check import check
 from weftform.cli.doctor import doctor
 from weftform.cli.new import new
 from weftform.cli.probe import probe
+from weftform.cli.reproduce import reproduce
 from weftform.cli.run import run
 from weftform.cli.studies import studies
 from weftform.cli.view import view
@@ -22,5 +23,6 @@ VERBS: dict[str, Callable[..., Any]] = {
     "probe": probe,
     "studies": studies,
     "cards": cards,
+    "reproduce": reproduce,
     "doctor": doctor,
 }

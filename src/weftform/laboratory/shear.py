@@ -98,7 +98,6 @@ class ShearCurve:
                 "quantity": "normalised-shear-force",
                 "shear_angle_deg": [float(v) for v in np.degrees(self.fit.x)],
                 "values": [float(v) for v in self.fit.y],
-                "valid_to_deg": end,
                 "source": source,
             }
         return {
