@@ -74,6 +74,7 @@ class Case(ABC):
             ramp=ramp,
             mass_scaling=solver.mass_scaling,
             damping=solver.damping_per_s,
+            viscosity=solver.viscosity,
             hourglass=solver.hourglass,
             safety=solver.safety,
             least_step=solver.least_step_s,

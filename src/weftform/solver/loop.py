@@ -81,7 +81,7 @@ def _mode_amplitude(kind, value):
 def _sweep_band(
     state, band, bands, first, last, spans, edge, node, membrane, series,
     warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
-    tool_table, poses, touching, reactions, step, last_step, kick, keep, damping,
+    tool_table, poses, touching, reactions, step, last_step, kick, keep, damping, viscosity,
     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
 ):  # fmt: skip
@@ -102,7 +102,7 @@ def _sweep_band(
             begin = spans[r, 2]
             warp_row(
                 state, row + np.uint64(begin), np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride,
-                warp_inverse, warp_degree, warp_pieces, warp_law,
+                warp_inverse, viscosity, warp_degree, warp_pieces, warp_law,
             )  # fmt: skip
         if r < last:
             begin = spans[r, 4]
@@ -113,11 +113,13 @@ def _sweep_band(
             )  # fmt: skip
             weft_row(
                 state, row + np.uint64(begin), count, edge[begin:], node[begin:], stride, row_length, half_cells,
-                weft_inverse, weft_degree, weft_pieces, weft_law,
+                weft_inverse, viscosity, weft_degree, weft_pieces, weft_law,
             )  # fmt: skip
         else:
             for k in range(block):
                 node[k] = 0.0
+            for k in range(stride):
+                node[2 * block + at.LEAD + 2 * stride + k] = 0.0
         if r < own_first:
             continue
         begin = spans[r, 0]
@@ -164,7 +166,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         warp_law, weft_law, shear_law, warp_inverse, weft_inverse,
         tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
-        density,
+        density, viscous,
     ):  # fmt: skip
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
         environment = flush_subnormals()
@@ -204,7 +206,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 _sweep_band(
                     state, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band], node[band], membrane,
                     series, warp_law, weft_law, shear_law, warp_inverse, weft_inverse, tool_table, poses, touching,
-                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
+                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step, viscous * density * inertia / step,
                     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip

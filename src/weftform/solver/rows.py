@@ -38,22 +38,31 @@ def row_loop(function: Callable[..., Any]) -> Any:
 
 
 @row_loop
-def warp_row(state, row, count, edge, node, stride, inverse_length, degree, pieces, law):
+def warp_row(state, row, count, edge, node, stride, inverse_length, viscosity, degree, pieces, law):
     """Warp connectors of a row, plus what the cells below carried to their upper edges; starts the nodal force."""
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
+    vx, vy, vz = z + s, z + s + s, z + s + s + s
     weight = row + s * np.uint64(at.WARP_LINE)
     warp = LEAD
     upper = LEAD + s + s + s + LEAD + LEAD
     weft = LEAD
     force = LEAD + s + s + s + LEAD + LEAD
+    heat = force + s + s + s + LEAD + LEAD + s
     for i in range(count):
         dx = state[x + U1 + i] - state[x + i]
         dy = state[y + U1 + i] - state[y + i]
         dz = state[z + U1 + i] - state[z + i]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         pull = connector_force(law[0], degree, pieces, law[2], law[3], law[4], length * inverse_length - 1.0)
-        f = state[weight + i] * pull / length
+        rate = (
+            dx * (state[vx + U1 + i] - state[vx + i])
+            + dy * (state[vy + U1 + i] - state[vy + i])
+            + dz * (state[vz + U1 + i] - state[vz + i])
+        ) / length
+        drag = viscosity * rate
+        node[heat + i] = state[weight + i] * drag * rate
+        f = state[weight + i] * (pull + drag) / length
         edge[warp + i] = f * dx + edge[upper + i]
         edge[warp + s + i] = f * dy + edge[upper + s + i]
         edge[warp + s + s + i] = f * dz + edge[upper + s + s + i]
@@ -177,23 +186,34 @@ def cell_row(
 
 
 @row_loop
-def weft_row(state, row, count, edge, node, stride, row_length, half_cells, inverse_length, degree, pieces, law):
+def weft_row(
+    state, row, count, edge, node, stride, row_length, half_cells, inverse_length, viscosity, degree, pieces, law
+):  # fmt: skip
     """Weft connectors between a row and the next, plus the share of the cells on both sides."""
     s = np.uint64(stride)
     step = np.uint64(row_length)
     x, y, z = row, row + s, row + s + s
+    vx, vy, vz = z + s, z + s + s, z + s + s + s
     weight = row + s * np.uint64(at.WEFT_LINE)
     block = s + s + s + LEAD + LEAD
     left = LEAD + block + block
     right = left + (block if half_cells else np.uint64(0)) - U1
     weft = LEAD
+    heat = LEAD + block + block + s + s
     for i in range(count):
         dx = state[x + step + i] - state[x + i]
         dy = state[y + step + i] - state[y + i]
         dz = state[z + step + i] - state[z + i]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         pull = connector_force(law[0], degree, pieces, law[2], law[3], law[4], length * inverse_length - 1.0)
-        f = state[weight + i] * pull / length
+        rate = (
+            dx * (state[vx + step + i] - state[vx + i])
+            + dy * (state[vy + step + i] - state[vy + i])
+            + dz * (state[vz + step + i] - state[vz + i])
+        ) / length
+        drag = viscosity * rate
+        node[heat + i] = state[weight + i] * drag * rate
+        f = state[weight + i] * (pull + drag) / length
         node[weft + i] = f * dx + (edge[left + i] + edge[right + i])
         node[weft + s + i] = f * dy + (edge[left + s + i] + edge[right + s + i])
         node[weft + s + s + i] = f * dz + (edge[left + s + s + i] + edge[right + s + s + i])
@@ -344,6 +364,8 @@ def update_row(state, row, count, node, stride, step, mean_step, keep, damping):
     damped = row + s * np.uint64(at.DAMPED)
     inertia = row + s * np.uint64(at.INERTIA)
     force = LEAD + s + s + s + LEAD + LEAD
+    warp_heat = force + s + s + s + LEAD + LEAD + s
+    weft_heat = warp_heat + s
     for i in range(count):
         ox = state[vx + i]
         oy = state[vy + i]
@@ -360,4 +382,6 @@ def update_row(state, row, count, node, stride, step, mean_step, keep, damping):
         mx2 = ox + nx
         my2 = oy + ny
         mz2 = oz + nz
-        state[damped + i] += damping * state[inertia + i] * (mx2 * mx2 + my2 * my2 + mz2 * mz2)
+        state[damped + i] += damping * state[inertia + i] * (mx2 * mx2 + my2 * my2 + mz2 * mz2) + step * (
+            node[warp_heat + i] + node[weft_heat + i]
+        )

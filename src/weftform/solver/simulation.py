@@ -80,8 +80,10 @@ class Settings:
     ramp: float = 0.2
     mass_scaling: float = 1.0
     damping: float = 0.0
+    viscosity: float = 0.06
+    """Dashpot along each connector, as a share of the critical damping of the highest mode of the net."""
     hourglass: float = 0.01
-    safety: float = 0.8
+    safety: float = 0.85
     least_step: float = 0.0
     """Below this step [s] the mass of the fabric is scaled up, uniformly and only as long as it takes."""
     most_steps: int = 20_000_000
@@ -431,6 +433,7 @@ class Simulation:
                 self._motion_times, self._motion_values, self._motion_knots, settings.ramp,
                 self._driven_nodes, self._driven_state, self._driven_held, self._driven_modes, self._mode_motion,
                 self._mode_kind, self.clock, steps, stop, settings.damping, self.density,
+                settings.viscosity * self.problem.grid.cell_area,
             )
         )  # fmt: skip
 
