@@ -200,7 +200,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
             for h in range(halo_to.shape[0]):
                 source = halo_from[h] * row_length
                 target_row = halo_to[h] * row_length
-                for k in range(3 * stride):
+                for k in range(6 * stride):
                     state[target_row + k] = state[source + k]
             for band in numba.prange(bands):
                 _sweep_band(
