@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-FOLDER = Path(__file__).parents[1] / "examples"
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "examples"
 
 
 def example(name: str) -> ModuleType:
@@ -48,3 +50,16 @@ def test_holder_acts_through_friction_alone() -> None:
 def test_strip_returns_the_curve_of_the_card() -> None:
     # Eq. 11 is exact for straight lines of equal connectors; what is left is inertia and the output's averaging
     assert example("tensile_strip").main() < 0.01
+
+
+@pytest.mark.slow
+def test_script_of_the_readme(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```python\n(.*?)^```", text, flags=re.S | re.M)
+    assert len(script.splitlines()) <= 15
+    exec(script, {})
+    printed = capsys.readouterr().out
+    # half-diagonal yarns: the point 10 mm along warp and weft of a blank turned by 45 degrees stays on the y axis
+    assert "yarns (10, 10) at (-0.0," in printed or "yarns (10, 10) at (0.0," in printed
+    assert "punch force at 15 mm" in printed
