@@ -206,7 +206,8 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 _sweep_band(
                     state, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band], node[band], membrane,
                     series, warp_law, weft_law, shear_law, warp_inverse, weft_inverse, tool_table, poses, touching,
-                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step, viscous * density * inertia / step,
+                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
+                    viscous * density * inertia / step,
                     stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip
