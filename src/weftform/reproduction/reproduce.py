@@ -143,6 +143,7 @@ def reproduce(
         *simulated.bias_items(results),
         *simulated.frame_items(results),
         *simulated.hemisphere_items(results),
+        *simulated.convergence_items(results),
         *misprints(fabric),
     ]
     drawn: list[Path] = []

@@ -346,3 +346,76 @@ def hemisphere_items(results: Results) -> list[Item]:
             ),
         ]
     return items
+
+
+def convergence_items(results: Results) -> list[Item]:
+    """The hemisphere at 0/90 with other meshes, at half the speed and as a full model, against the shipped study."""
+    section = "Hemisphere, 0/90 degrees: mesh, speed and symmetry"
+    base = results["hemisphere-0-90"].summary
+    items = []
+    for run, what in (
+        ("hemisphere-coarse", "cells 1.4 times larger"),
+        ("hemisphere-fine", "cells 1.4 times smaller"),
+        ("hemisphere-slow", "half the speed"),
+    ):
+        found = results[run].summary
+        items += [
+            Item(
+                section,
+                f"{what}: largest shear angle (deg)",
+                "shipped study",
+                base["shear_angle_deg"]["max"],
+                found["shear_angle_deg"]["max"],
+                1.0,
+                absolute=True,
+            ),
+            Item(
+                section,
+                f"{what}: draw-in on the x axis (mm)",
+                "shipped study",
+                base["draw_in_mm"]["edge_x"],
+                found["draw_in_mm"]["edge_x"],
+                0.3,
+                absolute=True,
+            ),
+            Item(
+                section,
+                f"{what}: draw-in at the corner (mm)",
+                "shipped study",
+                base["draw_in_mm"]["corner"],
+                found["draw_in_mm"]["corner"],
+                0.3,
+                absolute=True,
+            ),
+            Item(
+                section,
+                f"{what}: punch force at 30 mm (N)",
+                "shipped study",
+                base["punch_force_N"],
+                found["punch_force_N"],
+            ),
+        ]
+    points = [(float(u), float(v)) for u in range(0, 73, 8) for v in range(0, 73, 8)]
+    quarter, full = (
+        np.array([point.shear_angle_deg for point in results[run].probe(points)])
+        for run in ("hemisphere-0-90", "hemisphere-full")
+    )
+    items += [
+        Item(
+            section,
+            f"full against quarter model: largest difference of the shear angle over {len(points)} points (deg)",
+            "symmetry",
+            0.0,
+            float(np.abs(full - quarter).max()),
+            0.2,
+        ),
+        Item(
+            section,
+            "full against quarter model: punch force (N)",
+            "quarter model",
+            base["punch_force_N"],
+            results["hemisphere-full"].summary["punch_force_N"],
+            0.02,
+        ),
+    ]
+    return items
