@@ -76,7 +76,7 @@ def forecast(study: Study) -> Forecast:
     def step(warp_strain: float, weft_strain: float) -> float:
         warp = _tangent(fabric.warp, grid.weft_pitch, warp_strain) / grid.warp_pitch
         weft = _tangent(fabric.weft, grid.warp_pitch, weft_strain) / grid.weft_pitch
-        return model.solver.safety * stable_step(max(warp, weft), contact, mass)
+        return model.solver.safety * stable_step(max(warp, weft), contact, mass, model.solver.viscosity)
 
     first = step(0.0, 0.0)
     tight = step(

@@ -22,6 +22,11 @@ def crossing_stiffness(warp: float, weft: float, membrane: float, sine: float) -
 
 
 @scalar
-def stable_step(crossing: float, contact: float, mass: float) -> float:
-    """``2 / omega`` [s] with ``omega^2 = (4 crossing + contact) / mass`` (a zig-zag from node to node)."""
-    return 2.0 * math.sqrt(mass / (4.0 * crossing + contact))
+def stable_step(crossing: float, contact: float, mass: float, viscosity: float = 0.0) -> float:
+    """Largest step [s] of central differences: ``2 / omega`` with ``omega^2 = (4 crossing + contact) / mass``.
+
+    The highest mode is a zig-zag from node to node. With dashpots ``c = viscosity mass / step`` that see the
+    velocity of half a step ago it obeys ``x^2 - (2 - 4 viscosity - h^2 omega^2) x + 1 - 4 viscosity = 0``, which
+    is stable for ``h omega < 2 sqrt(1 - 2 viscosity)``.
+    """
+    return 2.0 * math.sqrt((1.0 - 2.0 * viscosity) * mass / (4.0 * crossing + contact))

@@ -70,14 +70,28 @@ class Fields:
         """
         warp, weft = self._warp_edges, self._weft_edges
         has_warp, has_weft = self.grid.warp_lines > 0.0, self.grid.weft_lines > 0.0
-        corners = (
-            (warp[:-1], weft[:, :-1], has_warp[:-1] & has_weft[:, :-1]),
-            (warp[:-1], weft[:, 1:], has_warp[:-1] & has_weft[:, 1:]),
-            (warp[1:], weft[:, 1:], has_warp[1:] & has_weft[:, 1:]),
-            (warp[1:], weft[:, :-1], has_warp[1:] & has_weft[:, :-1]),
-        )
+        lower, upper, left, right = warp[:-1], warp[1:], weft[:, :-1], weft[:, 1:]
+        has = [has_warp[:-1], has_warp[1:], has_weft[:, :-1], has_weft[:, 1:]]
+        share, signs = self.grid.mirrors
+        if share.any():
+            # the legs that a half cell on a plane of symmetry lacks are mirror images of those it has
+            own_lower, own_left = (w[..., None] for w in self.grid.edge_weights)
+            leg_warp = own_lower * lower + (1.0 - own_lower) * upper
+            leg_weft = own_left * left + (1.0 - own_left) * right
+            cut = (share > 0.0)[..., None]
+            lower = np.where(cut & (own_lower == 0.0), signs * leg_weft, lower)
+            upper = np.where(cut & (own_lower == 1.0), signs * leg_weft, upper)
+            left = np.where(cut & (own_left == 0.0), signs * leg_warp, left)
+            right = np.where(cut & (own_left == 1.0), signs * leg_warp, right)
+            has = [present | cut[..., 0] for present in has]
         exists = self.grid.cells != Cell.ABSENT
-        return np.stack([np.where(has & exists, _angle(a, b), np.nan) for a, b, has in corners])
+        corners = (
+            (lower, left, has[0] & has[2]),
+            (lower, right, has[0] & has[3]),
+            (upper, right, has[1] & has[3]),
+            (upper, left, has[1] & has[2]),
+        )
+        return np.stack([np.where(known & exists, _angle(a, b), np.nan) for a, b, known in corners])
 
     @cached_property
     def node_shear(self) -> Floats:
@@ -111,7 +125,24 @@ class Fields:
         force = line.value(np.maximum(strain, 0.0)) + law.slack_ratio * line.slope(0.0) * np.minimum(strain, 0.0)
         return strain, force
 
-    def _on_cells(self, values: Floats, warp: bool) -> Floats:
+    @cached_property
+    def _strains(self) -> dict[bool, Floats]:
+        return {warp: self._lines(warp)[0] for warp in (True, False)}
+
+    @cached_property
+    def _forces_per_width(self) -> dict[bool, Floats]:
+        grid = self.grid
+        return {warp: self._lines(warp)[1] / (grid.weft_pitch if warp else grid.warp_pitch) for warp in (True, False)}
+
+    def _on_cells(self, values: dict[bool, Floats], warp: bool) -> Floats:
+        """Mean over the connectors of a cell; on a plane of symmetry the mirror images of the other direction's count too."""
+        own = self._mean_of_edges(values[warp], warp)
+        share = self.grid.mirrors[0]
+        if not share.any():
+            return own
+        return (1.0 - share) * own + share * self._mean_of_edges(values[not warp], not warp)
+
+    def _mean_of_edges(self, values: Floats, warp: bool) -> Floats:
         lower, left = self.grid.edge_weights
         if warp:
             return lower * values[:-1] + (1.0 - lower) * values[1:]
@@ -120,22 +151,22 @@ class Fields:
     @cached_property
     def warp_strain(self) -> Floats:
         """Nominal strain of the warp yarns, mean of a cell's connectors, shape [rows - 1, columns - 1]."""
-        return self._on_cells(self._lines(True)[0], True)
+        return self._on_cells(self._strains, True)
 
     @cached_property
     def weft_strain(self) -> Floats:
         """Nominal strain of the weft yarns."""
-        return self._on_cells(self._lines(False)[0], False)
+        return self._on_cells(self._strains, False)
 
     @cached_property
     def warp_force(self) -> Floats:
         """Tension of the warp per width [N/mm], shape [rows - 1, columns - 1]."""
-        return self._on_cells(self._lines(True)[1], True) / self.grid.weft_pitch
+        return self._on_cells(self._forces_per_width, True)
 
     @cached_property
     def weft_force(self) -> Floats:
         """Tension of the weft per width [N/mm]."""
-        return self._on_cells(self._lines(False)[1], False) / self.grid.warp_pitch
+        return self._on_cells(self._forces_per_width, False)
 
     @cached_property
     def directions(self) -> tuple[Floats, Floats]:

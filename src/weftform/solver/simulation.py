@@ -197,6 +197,7 @@ class Simulation:
         self._inertia_work = 0.0
         self._surveys = 0
         self.last = self._survey()
+        self._before = self.last
         self._enter_ledger()
         self._choose_step()
         self._choose_holder_mass()
@@ -287,7 +288,11 @@ class Simulation:
         weft = np.zeros(grid.shape)
         weft[1:] += grid.weft_lines
         weft[:-1] += grid.weft_lines
-        return np.where(grid.active, np.maximum(grid.node_area, 0.5 * grid.cell_area * np.maximum(warp, weft)), 0.0)
+        lines = np.maximum(warp, weft)
+        if grid.along_bias:
+            # of a crossing on a plane of symmetry half is modelled, and its warp lines go on as weft lines beyond
+            lines = np.where(grid.on_plane.any(axis=-1), 0.5 * (warp + weft), lines)
+        return np.where(grid.active, np.maximum(grid.node_area, 0.5 * grid.cell_area * lines), 0.0)
 
     def _place_tools(self) -> None:
         tools = self.problem.tools
@@ -342,7 +347,8 @@ class Simulation:
             held = driven.held[:, c]
             self._state[local[held], at.INVERSE_MASS + c, column[held]] = 0.0
         # a prescribed crossing takes its inertia and damping from the machine that moves it, not from the fabric's ledger
-        self._state[local, at.INERTIA, column] = 0.0
+        whole = driven.held.all(axis=1)
+        self._state[local[whole], at.INERTIA, column[whole]] = 0.0
         self._driven_held = np.ascontiguousarray(driven.held)
         self._driven_modes = np.ascontiguousarray(driven.modes)
         self._mode_motion = np.asarray(driven.motions, np.int64)
@@ -353,10 +359,12 @@ class Simulation:
         warp, weft, shear = self._packed
         # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the
         # truth.
-        _, warp_slope = _largest(warp, s[survey.WARP_STRAIN])
-        _, weft_slope = _largest(weft, s[survey.WEFT_STRAIN])
+        # and as far ahead as they moved since the last survey, so that fast straining does not outrun the step
+        ahead = s + np.maximum(s - self._before, 0.0)
+        _, warp_slope = _largest(warp, ahead[survey.WARP_STRAIN])
+        _, weft_slope = _largest(weft, ahead[survey.WEFT_STRAIN])
         k_warp, k_weft = warp_slope / grid.warp_pitch, weft_slope / grid.weft_pitch
-        t = s[survey.HALF_TANGENT]
+        t = min(ahead[survey.HALF_TANGENT], 1.0)
         sine = 2.0 * t / (1.0 + t * t)
         ratio, ratio_slope = _largest(shear, t)
         modulus = 0.5 * (ratio + t * ratio_slope) * (1.0 + t * t) + t * ratio
@@ -365,7 +373,9 @@ class Simulation:
         crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
         contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
         settings = self.problem.settings
-        step = settings.safety * stability.stable_step(crossing, contact, self.density * grid.cell_area)
+        step = settings.safety * stability.stable_step(
+            crossing, contact, self.density * grid.cell_area, settings.viscosity
+        )
         scale = max(1.0, (settings.least_step / step) ** 2)
         if scale != self.clock[loop.C_INERTIA]:
             # heavier at the same speed: the energy that this adds is booked as work
@@ -413,8 +423,10 @@ class Simulation:
                     f"stopped after {self.steps} steps at t = {self.time:.4g} s, before the end",
                     hint="raise solver.most_steps, or use mass scaling or a shorter duration",
                 )
-            made = self._advance(SURVEY_EVERY, stop)
+            # short batches at first: nothing is known yet about how fast the blank is strained
+            made = self._advance(min(SURVEY_EVERY, 8 + 4 * self._surveys), stop)
             self._surveys += 1
+            self._before = self.last
             self.last = self._survey()
             if not self.last[survey.FINITE]:
                 self._report_blow_up()
@@ -494,6 +506,7 @@ class Simulation:
             "tools": self._tool_table.copy(),
             "inertia": np.array([self.largest_inertia, self._inertia_work]),
             "surveys": np.array([float(self._surveys)]),
+            "before": self._before,
         }
 
     def restore(self, saved: dict[str, Floats]) -> None:
@@ -516,6 +529,7 @@ class Simulation:
         self._tool_table[:] = saved["tools"]
         self.largest_inertia, self._inertia_work = (float(v) for v in saved["inertia"])
         self._surveys = int(saved["surveys"][0])
+        self._before = saved["before"]
         self.last = self._survey()
 
     # -- looking ---------------------------------------------------------------------------------------------------

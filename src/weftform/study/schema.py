@@ -117,7 +117,7 @@ class SolverTable(Declared):
 
     mass_scaling: Annotated[float, Field(strict=True, ge=1, le=1e6, allow_inf_nan=False)] = 1.0
     damping_per_s: NotNegative = 0.0
-    viscosity: Annotated[float, Field(strict=True, ge=0, le=0.5, allow_inf_nan=False)] = 0.06
+    viscosity: Annotated[float, Field(strict=True, ge=0, le=0.3, allow_inf_nan=False)] = 0.06
     hourglass: NotNegative = 0.01
     safety: Annotated[float, Field(strict=True, gt=0, le=0.98, allow_inf_nan=False)] = 0.85
     least_step_s: NotNegative = 0.0
