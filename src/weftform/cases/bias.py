@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 ZONES = ("a", "b", "c")
 BOUNDARY = 1.01
-"""Cells whose centre lies nearer than this many half diagonals to the edge of a zone (its outermost row) do not belong to its interior."""
+"""Cells whose centre lies nearer than this many half diagonals to the edge of a zone are not of its interior."""
 
 
 def cell_centres(grid: YarnGrid) -> Floats:
