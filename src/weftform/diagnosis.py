@@ -19,12 +19,15 @@ TINY = (
     "blank.cell_length_mm=7.5",
     "loading.stroke_mm=8",
     "loading.duration_s=0.03",
+    "solver.damping_per_s=500",
+    "solver.viscosity=0.06",
+    "solver.safety=0.85",
     "output.frames=2",
     "output.rows=5",
 )
 """Changes that make the shipped hemisphere a run of a fraction of a second."""
 
-TINY_SHEAR_DEG = 1.2194
+TINY_SHEAR_DEG = 1.2199
 """Mean shear angle of that run. Stored from a run whose default-size sibling meets the kinematic net and the closed forms (tests);
 it is compared, not trusted: a difference means that this machine computes something else."""
 
