@@ -46,11 +46,17 @@ def law_items(fabric: Fabric) -> list[Item]:
                 remark="derivative of Eq. 9",
             )
         )
-    grams = 3.9 / 150.0
+    elongation = fabric.warp.specimen_force.valid_to / fabric.warp.length
     lines = fabric.warp.width / 1.0 + 1.0
     items += [
         Item(
-            section, "Uc_max for l0 = 1 mm (mm)", "Sec. 3.2", 0.026, grams, 1e-6, remark="Eq. 11: 3.9 mm over N = 150"
+            section,
+            "Uc_max for l0 = 1 mm (mm)",
+            "Sec. 3.2",
+            0.026,
+            elongation,
+            1e-6,
+            remark="Eq. 11: 3.9 mm over N = 150",
         ),
         Item(
             section,
