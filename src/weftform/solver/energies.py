@@ -29,8 +29,8 @@ ENTRIES = 5
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def enter_ledger(
-    state, traits, trait_rows, row_index, columns, stride, fields, trait_fields, half_cells, first_tool, tools, density,
-    membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses,
+    state, traits, trait_rows, row_index, columns, stride, fields, trait_fields, half_cells, tools, density,
+    membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses, grip,
 ):  # fmt: skip
     """Sum the energies and integrate the membrane's work since the last entry.
 
@@ -69,10 +69,10 @@ def enter_ledger(
                 t = tool_table[k]
                 distance, _, _ = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
                 gap = distance - t[5]
-                field = n + (first_tool + at.TOOL_FIELDS * k) * stride
                 stiffness = t[6] * area
                 if gap < 0.0:
-                    stick = state[field] ** 2 + state[field + stride] ** 2 + state[field + 2 * stride] ** 2
+                    held = grip[row_index[j], k, :, i]
+                    stick = held[0] ** 2 + held[1] ** 2 + held[2] ** 2
                     out[CONTACT] += 0.5 * stiffness * gap * gap + 0.5 * area * stick / (t[8] * t[6])
             weight = traits[m + at.WARP_LINE * stride]
             if weight > 0.0:

@@ -30,9 +30,6 @@ LEFT_WEIGHT = 9
 MIRROR = 10
 MIRROR_Z = 11
 
-TOOL_FIELDS = 3
-"""Per tool: friction traction [MPa]."""
-
 LANES = 8
 """Loops run over whole blocks of so many places: the widest vector unit holds eight numbers."""
 
@@ -97,14 +94,9 @@ class Layout:
         return FIRST_OPTIONAL
 
     @property
-    def tool(self) -> int:
-        """First field of the first tool."""
-        return self.force + 3 * self.driven
-
-    @property
     def fields(self) -> int:
         """Fields per row."""
-        return self.tool + TOOL_FIELDS * self.tools
+        return self.force + 3 * self.driven
 
     @property
     def row(self) -> int:

@@ -73,8 +73,8 @@ def _mode_amplitude(kind, value):
 def _sweep_band(
     state, traits, trait_rows, band, bands, first, last, spans, edge, node, membrane, series,
     warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-    tool_table, poses, pieces, reactions, heats, step, last_step, kick, keep, damping, viscosity,
-    stride, row_length, trait_length, block, tools, half_cells, driven, force_field, first_tool,
+    tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep, damping, viscosity,
+    stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
 ):  # fmt: skip
     """One step of the rows ``first`` to ``last`` (halos included) of a band.
@@ -82,7 +82,7 @@ def _sweep_band(
     ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges
     (wider by what its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
     ``pieces`` holds for each tool and row how many pieces of it can touch, then where each begins, its length and
-    kind (:mod:`weftform.solver.survey`); ``heats`` sums per row the heat of damping and of friction with each tool.
+    kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of damping and of friction with each tool.
     """
     flush_subnormals()
     for k in range(block):
@@ -106,17 +106,16 @@ def _sweep_band(
                 for m in range(pieces[k, r, 0, 0]):
                     begin = pieces[k, r, m + 1, 0]
                     place = row + np.uint64(begin)
+                    held = np.uint64((r * tools + k) * (3 * stride) + begin)
                     count = np.uint64(pieces[k, r, m + 1, 1])
                     if pieces[k, r, m + 1, 2] == ON_FACE:
                         axial, slipped = face_row(
-                            state, place, traits, trait + np.uint64(begin), count, node[begin:], stride,
-                            first_tool + at.TOOL_FIELDS * k,
+                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
                             tool_table[k], poses[k, P_Z], last_step,
                         )  # fmt: skip
                     else:
                         axial, slipped = contact_row(
-                            state, place, traits, trait + np.uint64(begin), count, node[begin:], stride,
-                            first_tool + at.TOOL_FIELDS * k,
+                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
                             tool_table[k], poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
                         )  # fmt: skip
                     reaction += axial
@@ -158,7 +157,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     half_cells = layout.half_cells
     driven = layout.driven
     trait_length = layout.traits * layout.stride
-    force_field, first_tool = layout.force, layout.tool
+    force_field = layout.force
     warp_degree, warp_pieces = layout.warp_degree, layout.warp_pieces
     weft_degree, weft_pieces = layout.weft_degree, layout.weft_pieces
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
@@ -166,7 +165,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     def advance(
         state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
         warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-        tool_table, poses, pieces, reactions, heats, motion_times, motion_values, motion_knots, ramp,
+        tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
         density, viscous,
     ):  # fmt: skip
@@ -208,9 +207,10 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                 _sweep_band(
                     state, traits, trait_rows, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band],
                     node[band], membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-                    tool_table, poses, pieces, reactions, heats, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
+                    tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep,
+                    0.25 * alpha * density * inertia * mean_step,
                     viscous * density * inertia / step,
-                    stride, row_length, trait_length, block, tools, half_cells, driven, force_field, first_tool,
+                    stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip
             for k in range(tools):

@@ -8,7 +8,7 @@ from weftform.mechanics.motion import motion_value
 from weftform.solver import layout as at
 from weftform.solver import loop
 from weftform.solver.problem import Motion, Problem
-from weftform.solver.sheet import Sheet
+from weftform.solver.sheet import Sheet, aligned
 
 
 class Machine:
@@ -22,6 +22,8 @@ class Machine:
         Motions, shape [motions, knots].
     pieces
         Pieces of rows that each tool can touch (:mod:`weftform.solver.survey`).
+    grip
+        Friction traction of each tool on each crossing [MPa], shape [local rows, tools, 3, stride].
     reactions
         Axial force of each tool on each local row [N].
     heats
@@ -35,6 +37,7 @@ class Machine:
         self._place_tools(problem)
         tools = len(problem.tools)
         self.pieces = np.zeros((tools, sheet.local_rows, 1 + at.blocks_for(sheet.columns), 3), np.int32)
+        self.grip = aligned((sheet.local_rows, tools, 3, sheet.layout.stride))
         self.reactions = np.zeros((tools, sheet.local_rows))
         self.heats = np.zeros((sheet.local_rows, 1 + tools))
         self._drive_crossings(problem, sheet)

@@ -19,11 +19,13 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core.compiler import Compiler
 
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.connector import connector_force
 from weftform.mechanics.membrane import SMALLEST_AREA_RATIO, shear_stress
 from weftform.mechanics.piecewise import polynomial
+from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
 from weftform.solver.vector_width import use_full_width
 
@@ -32,9 +34,26 @@ LEAD = np.uint64(at.LEAD)
 LANES = np.uint64(at.LANES)
 
 
+class SeparateArrays(Compiler):
+    """Numba's compiler, told that no two array arguments overlap.
+
+    The vectoriser otherwise guards each loop with a check of every pair of arrays, and takes the scalar loop where a
+    row is too short to be worth the checks.
+    """
+
+    def __init__(
+        self, typingctx: Any, targetctx: Any, library: Any, args: Any, return_type: Any, flags: Any, locals: Any
+    ):
+        flags.noalias = True
+        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
+
+
 def row_loop(function: Callable[..., Any]) -> Any:
-    """Compile a loop over one row so that it is inlined where its constants are known."""
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)(function)
+    """Compile a loop over one row so that it is inlined where its constants are known.
+
+    No two of its array arguments may overlap.
+    """
+    return numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True, pipeline_class=SeparateArrays)(function)
 
 
 @row_loop
@@ -65,6 +84,7 @@ def warp_row(
     ``viscosity`` [N s/mm3] is that of the dashpots over the squared pitch (docs/theory/dynamics.md).
     """
     use_full_width()
+    numba.literally(stride)
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
@@ -79,8 +99,10 @@ def warp_row(
         dx = state[x + U1 + i] - state[x + i]
         dy = state[y + U1 + i] - state[y + i]
         dz = state[z + U1 + i] - state[z + i]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        pull = connector_force(law, degree, pieces, width, end_slope, slack, length * inverse_length - 1.0)
+        squared = dx * dx + dy * dy + dz * dz
+        inverse = inverse_root(squared)
+        strain = squared * inverse * inverse_length - 1.0
+        pull = connector_force(law, degree, pieces, width, end_slope, slack, strain)
         rate = (
             dx * (state[vx + U1 + i] - state[vx + i])
             + dy * (state[vy + U1 + i] - state[vy + i])
@@ -88,7 +110,7 @@ def warp_row(
         )
         drag = viscosity * rate
         node[heat + i] = traits[weight + i] * (drag * rate)
-        f = traits[weight + i] * (pull / length + drag)
+        f = traits[weight + i] * (pull * inverse + drag)
         edge[warp + i] = f * dx + edge[upper + i]
         edge[warp + s + i] = f * dy + edge[upper + s + i]
         edge[warp + s + s + i] = f * dz + edge[upper + s + s + i]
@@ -123,7 +145,9 @@ def cell_row(
     (mechanics.membrane.covariant_forces); one reciprocal serves all five quotients of a cell.
     """
     use_full_width()
+    numba.literally(stride)
     s = np.uint64(stride)
+    numba.literally(row_length)
     step = np.uint64(row_length)
     x, y, z = row, row + s, row + s + s
     xu, yu, zu = x + step, y + step, z + step
@@ -237,7 +261,9 @@ def weft_row(
 ):  # fmt: skip
     """Weft connectors between a row and the next, plus the share of the cells on both sides."""
     use_full_width()
+    numba.literally(stride)
     s = np.uint64(stride)
+    numba.literally(row_length)
     step = np.uint64(row_length)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
@@ -252,8 +278,10 @@ def weft_row(
         dx = state[x + step + i] - state[x + i]
         dy = state[y + step + i] - state[y + i]
         dz = state[z + step + i] - state[z + i]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        pull = connector_force(law, degree, pieces, width, end_slope, slack, length * inverse_length - 1.0)
+        squared = dx * dx + dy * dy + dz * dz
+        inverse = inverse_root(squared)
+        strain = squared * inverse * inverse_length - 1.0
+        pull = connector_force(law, degree, pieces, width, end_slope, slack, strain)
         rate = (
             dx * (state[vx + step + i] - state[vx + i])
             + dy * (state[vy + step + i] - state[vy + i])
@@ -261,7 +289,7 @@ def weft_row(
         )
         drag = viscosity * rate
         node[heat + i] += traits[weight + i] * (drag * rate)
-        f = traits[weight + i] * (pull / length + drag)
+        f = traits[weight + i] * (pull * inverse + drag)
         node[weft + i] = f * dx + (edge[left + i] + edge[right + i])
         node[weft + s + i] = f * dy + (edge[left + s + i] + edge[right + s + i])
         node[weft + s + s + i] = f * dz + (edge[left + s + s + i] + edge[right + s + s + i])
@@ -277,6 +305,7 @@ def update_row(
     sum of the velocities before and after. Where crossings are driven their force is kept in the state.
     """
     use_full_width()
+    numba.literally(stride)
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s

@@ -72,8 +72,8 @@ class Sheet:
         self._traits = self._describe(volume, density)
         self._share_traits()
         self.spans: Ints = self._spread(row_spans(grid.active))
-        self.edge = np.zeros((bands, layout.edge_scratch))
-        self.node = np.zeros((bands, layout.node_scratch))
+        self.edge = aligned((bands, layout.edge_scratch))
+        self.node = aligned((bands, layout.node_scratch))
 
     def _lay_out_bands(self) -> None:
         bands = self.bands

@@ -167,7 +167,7 @@ class Simulation:
                 sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.bounds, sheet.halo_to,
                 sheet.halo_from, sheet.spans, sheet.edge, sheet.node, tuple(material.membrane), tuple(material.series),
                 *material.loop_laws, material.ends, material.warp_inverse, material.weft_inverse,
-                machine.tools, machine.poses, machine.pieces, machine.reactions, machine.heats,
+                machine.tools, machine.poses, machine.pieces, machine.grip.reshape(-1), machine.reactions, machine.heats,
                 machine.times, machine.values, machine.knots, settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
                 self.clock, steps, stop, settings.damping, self.density,
@@ -191,9 +191,9 @@ class Simulation:
         warp, weft, shear = material.laws
         entry: Floats = energies.enter_ledger(
             sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index, self.columns,
-            layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tool, layout.tools, self.density,
+            layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools, self.density,
             material.membrane, material.series, warp, weft, shear, material.shapes,
-            grid.warp_pitch, grid.weft_pitch, machine.tools, machine.poses,
+            grid.warp_pitch, grid.weft_pitch, machine.tools, machine.poses, machine.grip,
         )  # fmt: skip
         return entry
 
@@ -224,6 +224,7 @@ class Simulation:
             "inertia": np.array([self.largest_inertia, self._inertia_work]),
             "surveys": np.array([float(self._surveys)]),
             "heats": self.machine.heats[self.sheet.row_index],
+            "grip": self.machine.grip[self.sheet.row_index],
             "before": self._before,
         }
 
@@ -248,6 +249,7 @@ class Simulation:
         self.largest_inertia, self._inertia_work = (float(v) for v in saved["inertia"])
         self._surveys = int(saved["surveys"][0])
         self.machine.heats[self.sheet.row_index] = saved["heats"]
+        self.machine.grip[self.sheet.row_index] = saved["grip"]
         self._before = saved["before"]
         self.last = self._survey()
 
@@ -315,7 +317,7 @@ class Simulation:
         sheet = self.sheet
         rows = np.ascontiguousarray(sheet.state[sheet.row_index][:, :, : self.columns])
         forces: Floats = survey.contact_forces(
-            rows, sheet.trait(at.AREA), self.layout.tool, self.machine.tools, self.machine.poses
+            rows, sheet.trait(at.AREA), self.machine.grip[sheet.row_index], self.machine.tools, self.machine.poses
         )
         return forces
 

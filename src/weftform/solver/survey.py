@@ -282,9 +282,9 @@ def largest_on(coefficients, degree, pieces, width, end_slope, end):
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True)
-def contact_forces(rows, areas, first_tool, tool_table, poses):
+def contact_forces(rows, areas, grip, tool_table, poses):
     """Force of all tools on each crossing [N], shape [rows, columns, 3], from fields of shape [rows, fields,
-    columns] and the area of each crossing.
+    columns], the area of each crossing and its friction traction with each tool.
     """
     count, _, columns = rows.shape
     total = np.zeros((count, columns, 3))
@@ -298,8 +298,7 @@ def contact_forces(rows, areas, first_tool, tool_table, poses):
                 distance, normal_s, normal_z = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
                 press = t[6] * max(t[5] - distance, 0.0)
                 radial = press * normal_s / max(away, 1e-12)
-                field = first_tool + at.TOOL_FIELDS * k
-                total[j, i, 0] += area * (radial * x + rows[j, field, i])
-                total[j, i, 1] += area * (radial * y + rows[j, field + 1, i])
-                total[j, i, 2] += area * (press * normal_z + rows[j, field + 2, i])
+                total[j, i, 0] += area * (radial * x + grip[j, k, 0, i])
+                total[j, i, 1] += area * (radial * y + grip[j, k, 1, i])
+                total[j, i, 2] += area * (press * normal_z + grip[j, k, 2, i])
     return total
