@@ -191,8 +191,10 @@ class Run:
                 if stop in frames_at:
                     self._frame(writer)
                 if time.monotonic() - self._checkpointed > CHECKPOINT_SECONDS:
+                    writer.settle()
                     self._checkpoint(float(stop))
             self._finish(writer, "done")
+            writer.settle()
             (self.out / "checkpoint.npz").unlink(missing_ok=True)
         except KeyboardInterrupt:
             self._finish(writer, f"interrupted at {self.displacement:.2f} mm")
