@@ -100,7 +100,7 @@ class Comparison:
         return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
     def write(self, folder: Path | str | None = None, *, figures: bool = True) -> list[Path]:
-        """Write ``comparison.json`` and the figures.
+        """Write ``comparison.json`` and the figures; figures of a former comparison there go.
 
         Parameters
         ----------
@@ -115,6 +115,8 @@ class Comparison:
         folder = self.result.folder / "comparison" if folder is None else Path(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            for item in ITEMS:
+                (folder / f"{item}.png").unlink(missing_ok=True)
             write_whole(folder / "comparison.json", self.to_json() + "\n")
         except OSError as problem:
             raise ResultError(

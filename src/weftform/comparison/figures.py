@@ -71,21 +71,16 @@ def outline_figure(comparison: Comparison) -> Figure:
     _plan(axes, np.vstack([gap.measured.points, gap.simulated.points]))
     ring = np.vstack([gap.simulated.points, gap.simulated.points[:1]])
     axes.fill(*ring.T, color=SIMULATED, alpha=0.07, lw=0)
-    axes.plot(*ring.T, color=INK, lw=1.0, label="simulated")
+    axes.plot(*ring.T, color=INK, lw=1.0, label="simulated", zorder=4)
     reach = float(np.abs(gap.normal).max()) or 1e-9
     scale = Normalize(-reach, reach)
     half = 0.5 * gap.pieces.lengths[:, None] * np.stack([-gap.pieces.normals[:, 1], gap.pieces.normals[:, 0]], axis=1)
     middles = gap.pieces.middles
+    lines = list(np.stack([middles - half, middles + half], axis=1))
+    # a casing keeps the curve visible where the gap vanishes and its colour with it
+    axes.add_collection(LineCollection(lines, color="#8d959d", lw=4.2, capstyle="round", zorder=2.5))
     drawn = axes.add_collection(
-        LineCollection(
-            list(np.stack([middles - half, middles + half], axis=1)),
-            cmap=SIDES,
-            norm=scale,
-            array=gap.normal,
-            lw=3.0,
-            capstyle="round",
-            zorder=3,
-        )
+        LineCollection(lines, cmap=SIDES, norm=scale, array=gap.normal, lw=3.0, capstyle="round", zorder=3)
     )
     axes.plot([], [], color=MEASURED, lw=3.0, label="measured, coloured by its gap")
     worst = int(np.abs(gap.normal).argmax())

@@ -100,14 +100,21 @@ def _along(axis: int, pieces: Pieces, simulated: Ring) -> Floats:
     other = 1 - axis
     outward = simulated.segments.normals(simulated.line.is_ccw)[:, axis]
     facing = np.abs(outward) >= FACING
-    outward, starts, along = outward[facing], simulated.segments.starts[facing], simulated.segments.along[facing]
-    for k in np.flatnonzero(np.abs(pieces.normals[:, axis]) >= FACING):
-        here, side = pieces.middles[k], np.sign(pieces.normals[k, axis])
-        before = starts[:, other] - here[other]
-        after = before + along[:, other]
-        met = np.flatnonzero((before * after <= 0.0) & (before != after) & (outward * side > 0.0))
-        if met.size:
-            share = before[met] / (before[met] - after[met])
-            way = side * (here[axis] - starts[met, axis] - share * along[met, axis])
-            gaps[k] = way[np.abs(way).argmin()]
+    starts, along = simulated.segments.starts[facing], simulated.segments.along[facing]
+    asked = np.flatnonzero(np.abs(pieces.normals[:, axis]) >= FACING)
+    if not (facing.any() and asked.size):
+        return gaps
+    here = pieces.middles[asked]
+    rays = np.repeat(here[:, None, :], 2, axis=1)
+    rays[:, 0, axis], rays[:, 1, axis] = starts[:, axis].min() - 1e9, starts[:, axis].max() + 1e9
+    tree = shapely.STRtree(shapely.linestrings(np.stack([starts, starts + along], axis=1)))
+    ray, segment = tree.query(shapely.linestrings(rays))
+    side = np.sign(pieces.normals[asked[ray], axis])
+    same = outward[facing][segment] * side > 0.0
+    ray, segment, side = ray[same], segment[same], side[same]
+    # a segment that faces the axis runs across the ray, so it is met where their boxes meet
+    share = (here[ray, other] - starts[segment, other]) / along[segment, other]
+    way = side * (here[ray, axis] - starts[segment, axis] - share * along[segment, axis])
+    order = np.argsort(-np.abs(way), kind="stable")  # the nearest is written last
+    gaps[asked[ray[order]]] = way[order]
     return gaps

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 PIECES = 400
 """Pieces of each outline that take part."""
+FIRST_PIECES = 120
+"""Pieces while the turns are ranked."""
 SWEEP_DEG = 2.0
 """Step of the turns that are tried."""
 STARTS = 6
@@ -47,7 +49,7 @@ def register_outline(measured: Ring, simulated: Ring, *, scale: bool = False) ->
     scale
         Find a scale as well.
     """
-    fit = _OutlineFit(measured, simulated, scale)
+    fit = _OutlineFit(measured, simulated, scale, FIRST_PIECES)
     turns, misfits = fit.sweep()
     fit.turns = bool(np.ptp(misfits) >= ROUND * simulated.size)
     if not fit.turns:
@@ -65,7 +67,9 @@ def register_outline(measured: Ring, simulated: Ring, *, scale: bool = False) ->
     for k in ranked[1:]:
         if all(abs(wrapped(angles[k] - known)) > 1.0 for known in (angles[ranked[0]], *others)):
             others.append(angles[k])
-    return fit.placement(fit.robust(found[ranked[0]]), tuple(others))
+    fine = _OutlineFit(measured, simulated, scale, PIECES)
+    fine.turns = fit.turns
+    return fine.placement(fine.robust(found[ranked[0]]), tuple(others))
 
 
 def register_markers(measured: Floats, simulated: Floats, *, scale: bool = False) -> Placement:
@@ -98,9 +102,9 @@ class _OutlineFit:
     The turn is about the middle of the measured outline, and the shift is that of the middle.
     """
 
-    def __init__(self, measured: Ring, simulated: Ring, scale: bool) -> None:
+    def __init__(self, measured: Ring, simulated: Ring, scale: bool, count: int) -> None:
         self.measured, self.simulated, self.scale = _thinned(measured), _thinned(simulated), scale
-        self.own, self.target = self.measured.pieces(PIECES), self.simulated.pieces(PIECES)
+        self.own, self.target = self.measured.pieces(count), self.simulated.pieces(count)
         self.pivot, self.goal = self.measured.centre, self.simulated.centre
         self.weights = 0.5 * np.concatenate([_shares(self.own), _shares(self.target)])
         self.first_size = self.simulated.size / self.measured.size if scale else 1.0
@@ -173,14 +177,18 @@ class _OutlineFit:
             root = np.sqrt(1.0 + z)
             return np.stack([2.0 * weights * (root - 1.0), weights / root, -0.5 * weights / root**3])
 
+        def scatter(p: Floats) -> float:
+            return 1.4826 * _weighted_median(np.abs(self.distances(p)[0]), weights)
+
+        # narrow first, until outlying pieces no longer widen the scatter of the others; then as wide as good pieces need
         width = np.inf
         for _ in range(ROBUST_PASSES):
-            spread = max(OUTLYING * 1.4826 * _weighted_median(np.abs(self.distances(p)[0]), weights), floor)
+            spread = max(scatter(p), floor)
             if spread > 0.98 * width:
                 break
             width = spread
-            p = self._solve(p, loss, width, 1e-14)
-        return p
+            p = self._solve(p, loss, width, 1e-10)
+        return self._solve(p, loss, max(OUTLYING * scatter(p), floor), 1e-14)
 
     def _solve(self, start: Floats, loss: Any, width: float, finest: float) -> Floats:
         from scipy.optimize import least_squares
