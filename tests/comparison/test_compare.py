@@ -12,7 +12,9 @@ from typer.testing import CliRunner
 import weftform
 from weftform.cli import app
 from weftform.comparison import LIMITED
-from weftform.comparison.figures import write_figures
+from weftform.comparison.figures import angles_figure, curve_figure, markers_figure, outline_figure, write_figures
+from weftform.report.style import house_style
+from weftform.result.writer import claim_folder
 
 POINTS = [(10.0, 10.0), (30.0, -20.0), (-40.0, 35.0), (-15.0, -50.0)]
 TURN, SHIFT = 30.0, (12.0, -7.0)
@@ -202,14 +204,32 @@ def test_results_folder_by_default(along_yarns, files) -> None:
     assert written == [along_yarns.folder / "comparison" / "comparison.json"]
 
 
-def test_figures_of_many_points(along_yarns, table, tmp_path) -> None:
-    """Forty long names do not leave the picture: the drawn names end inside of it."""
-    from weftform.comparison.figures import angles_figure
+def test_a_new_run_clears_the_comparison_of_the_former_result(along_yarns, tmp_path) -> None:
+    folder = tmp_path / "result"
+    (folder / "comparison").mkdir(parents=True)
+    (folder / "study.toml").write_text((along_yarns.folder / "study.toml").read_text())
+    for name in ("comparison.json", "outline.png", "notes.txt"):
+        (folder / "comparison" / name).write_text("former")
+    claim_folder(folder)
+    assert [p.name for p in (folder / "comparison").iterdir()] == ["notes.txt"]
 
+
+def test_captions_fit(along_yarns, files) -> None:
+    found = weftform.compare(along_yarns, **files, scale=True, tolerances={"outline": 2, "curve": "10 %"})
+    with house_style():
+        for draw in (outline_figure, angles_figure, curve_figure, markers_figure):
+            figure = draw(found)
+            extents = [text.get_window_extent(figure.canvas.get_renderer()) for text in figure.texts]
+            assert len(extents) == 2 and all(e.x0 >= 0.0 and e.x1 <= figure.bbox.width for e in extents), draw.__name__
+
+
+def test_figures_of_many_points(along_yarns, table, tmp_path) -> None:
+    """Forty long names neither leave the picture nor run into the caption."""
     rows = [(f"a rather long name {k}", 1.0 * k, 1.0 * k, 10.0) for k in range(40)]
     found = weftform.compare(along_yarns, angles=table("a.csv", "name,u_mm,v_mm,angle_deg", rows))
     figure = angles_figure(found)
     figure.canvas.draw()
     box = figure.axes[1].get_tightbbox()
-    assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= figure.bbox.width
+    caption = max(text.get_window_extent().y1 for text in figure.texts if text.get_text().startswith("Study"))
+    assert box.x0 >= 0.0 and box.y0 >= caption and box.x1 <= figure.bbox.width
     assert write_figures(found, tmp_path)[0].stat().st_size > 10_000

@@ -67,7 +67,7 @@ def test_a_part_that_only_the_simulation_has_counts() -> None:
     assert gap.hausdorff == pytest.approx(20.0, abs=1e-9) and np.abs(gap.normal).max() <= 5.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.floats(-180, 180), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.integers(0, 159), st.booleans())
 def test_gap_is_invariant_under_a_common_motion_and_the_order_of_points(degrees, x, y, first, back) -> None:
     one, other = 1.02 * lopsided(), lopsided(120)

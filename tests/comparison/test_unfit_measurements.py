@@ -50,6 +50,11 @@ def test_open_outline(along_yarns, table) -> None:
     assert problem.line == 61 and "closed" in problem.expected
 
 
+def test_outline_whose_last_side_is_long_ends_with_its_first_point(along_yarns, table) -> None:
+    points = np.vstack([circle(70.0, 100)[:60], circle(70.0, 100)[:1]])
+    assert weftform.compare(along_yarns, outline=table("o.csv", "x_mm,y_mm", points)).outline is not None
+
+
 def test_outline_of_a_line_or_two_points(along_yarns, table) -> None:
     refused("too few points", along_yarns, outline=table("o.csv", "x_mm,y_mm", [(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)]))
     line = [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (1.0, 1.0)]
@@ -100,6 +105,7 @@ def test_markers_without_material_points(along_yarns, table) -> None:
 
 def test_registration_that_has_nothing_to_go_by(along_yarns, table) -> None:
     angles = table("a.csv", ANGLES, [("p", 1.0, 1.0, 5.0), ("q", 2.0, 1.0, 5.0)])
+    refused("a scale can be found only", along_yarns, angles=angles, scale=True)
     refused("no outline to place", along_yarns, angles=angles, register_by="outline")
     one = table("m.csv", "marker,u_mm,v_mm,x_mm,y_mm", [("a", 0.0, 0.0, 1.0, 2.0)])
     refused("two markers at least", along_yarns, markers=one, register_by="markers")

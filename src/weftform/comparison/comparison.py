@@ -201,7 +201,16 @@ def compare(
     measured = read_outline(outline, read["outline"]) if outline is not None else None
     seen = read_markers(markers, float(opened.strokes[frame]), read["markers"]) if markers is not None else None
     way = _way(register_by, measured, seen)
-    simulated = Ring(opened.outline(frame)[1][:-1, :2])
+    if scale and way == "none":
+        raise MeasurementError(
+            "a scale can be found only where the measured axes are placed",
+            key="--scale",
+            expected="an outline or two markers at least, and a registration",
+        )
+    edge = opened.outline(frame)[1][:-1, :2]
+    if not np.isfinite(edge).all():
+        raise ResultError("the formed part has no outline at that stroke: the run blew up", file=opened.folder)
+    simulated = Ring(edge)
     warnings = [*_result_notes(opened)]
     placement = Placement()
     if way == "outline" and measured is not None:

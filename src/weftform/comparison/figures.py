@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from weftform.comparison.comparison import Comparison
+    from weftform.comparison.gaps import OutlineGap
 
 Floats = NDArray[np.float64]
 
@@ -66,13 +67,14 @@ def outline_figure(comparison: Comparison) -> Figure:
     """Measured over simulated outline in plan view, coloured by the gap along the normal, and the gap around the part."""
     gap = comparison.outline
     assert gap is not None
-    figure = new_figure(6.4, 8.35)
-    axes = place(figure, 0.72, 3.1, 4.6, 4.6)
+    figure = new_figure(6.4, 8.45)
+    axes = place(figure, 0.72, 3.2, 4.6, 4.6)
     _plan(axes, np.vstack([gap.measured.points, gap.simulated.points]))
     ring = np.vstack([gap.simulated.points, gap.simulated.points[:1]])
     axes.fill(*ring.T, color=SIMULATED, alpha=0.07, lw=0)
     axes.plot(*ring.T, color=INK, lw=1.0, label="simulated", zorder=4)
-    reach = float(np.abs(gap.normal).max()) or 1e-9
+    # a gap of less than a thousandth of the size is drawn pale: its colours would say nothing
+    reach = max(float(np.abs(gap.normal).max()), 1e-3 * gap.simulated.size)
     scale = Normalize(-reach, reach)
     half = 0.5 * gap.pieces.lengths[:, None] * np.stack([-gap.pieces.normals[:, 1], gap.pieces.normals[:, 0]], axis=1)
     middles = gap.pieces.middles
@@ -84,36 +86,37 @@ def outline_figure(comparison: Comparison) -> Figure:
     )
     axes.plot([], [], color=MEASURED, lw=3.0, label="measured, coloured by its gap")
     worst = int(np.abs(gap.normal).argmax())
-    outward = middles[worst] / max(float(np.linalg.norm(middles[worst])), 1e-9)
+    centre = gap.simulated.centre
+    inward = (centre - middles[worst]) / max(float(np.linalg.norm(centre - middles[worst])), 1e-9)
     axes.annotate(
         f"{abs(gap.normal[worst]):.2f} mm",
         tuple(middles[worst]),
-        tuple(middles[worst] - 0.3 * gap.simulated.size * outward),
+        tuple(middles[worst] + 0.3 * gap.simulated.size * inward),
         ha="center",
         va="center",
         weight="bold",
+        bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7},
         arrowprops={"arrowstyle": "-", "color": FAINT, "lw": 0.8, "shrinkA": 2, "shrinkB": 3},
         zorder=5,
     )
-    axes.text(
-        0.5, 0.5, _gap_words(comparison), transform=axes.transAxes, ha="center", va="center", size=8.5, linespacing=1.6
-    )
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, columnspacing=2.2)
-    bar = figure.colorbar(drawn, cax=place(figure, 5.5, 3.1, 0.14, 4.6))
+    bar = figure.colorbar(drawn, cax=place(figure, 5.5, 3.2, 0.14, 4.6))
     bar.outline.set_visible(False)
     bar.set_label("gap along the normal  [mm]    (+ measured outside)")
-    lower = place(figure, 0.72, 1.05, 4.6, 1.35)
-    around = np.degrees(np.arctan2(middles[:, 1], middles[:, 0]))
+    lower = place(figure, 0.72, 1.15, 4.6, 1.35)
+    around = np.degrees(np.arctan2(*(middles - centre).T[::-1]))
     order = np.argsort(around)
     _tolerance_band(lower, comparison, "outline")
     lower.axhline(0.0, color=INK, lw=0.8)
     lower.plot(around[order], gap.normal[order], ".", ms=2.2, color=MEASURED)
+    lower.update_datalim([(0.0, -0.5 * reach), (0.0, 0.5 * reach)])
+    lower.autoscale_view()
     lower.grid(True)
     lower.set_xlim(-180, 180)
     lower.set_xticks(range(-180, 181, 45))
-    lower.set_xlabel("direction from the centre of the press  [deg]")
+    lower.set_xlabel("direction from the middle of the outline  [deg]")
     lower.set_ylabel("gap  [mm]")
-    headline(figure, "Measured and simulated outline", _caption(comparison))
+    headline(figure, "Measured and simulated outline", _caption(comparison, _gap_words(gap)))
     return figure
 
 
@@ -124,9 +127,9 @@ def angles_figure(comparison: Comparison) -> Figure:
     points = found.points
     count = len(points)
     width = min(max(5.1, 0.42 * count), 12.0)
-    names = [p.name if len(p.name) < 15 else f"{p.name[:13]}…" for p in points]
+    names = [p.name if len(p.name) < 15 else f"{p.name[:6]}…{p.name[-6:]}" for p in points]
     slanted = max(map(len, names)) * count > 9 * width
-    bottom = 1.5 if slanted else 1.1
+    bottom = 1.95 if slanted else 1.1
     figure = new_figure(width + 1.1, bottom + 4.25)
     upper, lower = place(figure, 0.8, bottom + 1.5, width, 2.05), place(figure, 0.8, bottom, width, 1.15)
     at = np.arange(count)
@@ -288,15 +291,13 @@ def _tolerance_band(axes: Axes, comparison: Comparison, name: str) -> None:
     axes.update_datalim([(0.0, -1.5 * limit), (0.0, 1.5 * limit)])
 
 
-def _gap_words(comparison: Comparison) -> str:
-    gap = comparison.outline
-    assert gap is not None
-    lines = [f"Hausdorff distance  {gap.hausdorff:.2f} mm", ""]
-    for name, values in (("the normal", gap.normal), ("X", gap.along_x), ("Y", gap.along_y)):
+def _gap_words(gap: OutlineGap) -> str:
+    words = []
+    for name, values in (("along the normal", gap.normal), ("along X", gap.along_x), ("along Y", gap.along_y)):
         found = gap.statistics(values)
         if found["max"] is not None:
-            lines.append(f"gap along {name}:  max {found['max']:.2f}, mean {found['mean']:.2f} mm")
-    return "\n".join(lines)
+            words.append(f"{name} {found['max']:.2f}, {found['mean']:.2f}")
+    return f"Gap, largest and mean [mm]: {'; '.join(words)}; Hausdorff distance {gap.hausdorff:.2f}."
 
 
 def _caption(comparison: Comparison, note: str = "", *, axes: bool = True) -> str:

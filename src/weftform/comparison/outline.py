@@ -163,7 +163,8 @@ def read_outline(file: Path | str, reading: Reading = Reading()) -> MeasuredOutl
     points = np.stack([table.values[Quantity.X], table.values[Quantity.Y]], axis=1)
     fresh = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0) if len(points) else np.zeros(0, bool)
     points, lines = points[fresh], table.lines[fresh]
-    if len(points) > 1 and (points[0] == points[-1]).all():
+    closed = len(points) > 1 and bool((points[0] == points[-1]).all())
+    if closed:
         points, lines = points[:-1], lines[:-1]
     if len(np.unique(points, axis=0)) < 3:
         raise MeasurementError(
@@ -173,7 +174,8 @@ def read_outline(file: Path | str, reading: Reading = Reading()) -> MeasuredOutl
             expected="three different points at least, in order around the part",
             got=f"{len(np.unique(points, axis=0))}",
         )
-    _refuse_open(table, points, lines)
+    if not closed:
+        _refuse_open(table, points, lines)
     _refuse_crossing(table, points, lines)
     return MeasuredOutline(table.file, table.sha256, Ring(points), table.warnings)
 
@@ -189,7 +191,7 @@ def _refuse_open(table: MeasuredTable, points: Floats, lines: np.ndarray) -> Non
             expected=f"a closed curve; its longest step is {steps.max():.4g} mm",
             got=f"the first point at ({points[0, 0]:g}, {points[0, 1]:g}) mm, "
             f"the last at ({points[-1, 0]:g}, {points[-1, 1]:g}) mm",
-            hint="measure the whole edge, or add the points that are missing",
+            hint="measure the whole edge; where its last side is straight, end with the first point again",
         )
 
 
