@@ -14,7 +14,7 @@ from weftform.cli import app
 from weftform.comparison import LIMITED
 from weftform.comparison.figures import angles_figure, curve_figure, markers_figure, outline_figure, write_figures
 from weftform.report.style import house_style
-from weftform.result.writer import claim_folder
+from weftform.result.writer import RESOLVED, claim_folder
 
 POINTS = [(10.0, 10.0), (30.0, -20.0), (-40.0, 35.0), (-15.0, -50.0)]
 TURN, SHIFT = 30.0, (12.0, -7.0)
@@ -204,10 +204,10 @@ def test_results_folder_by_default(along_yarns, files) -> None:
     assert written == [along_yarns.folder / "comparison" / "comparison.json"]
 
 
-def test_a_new_run_clears_the_comparison_of_the_former_result(along_yarns, tmp_path) -> None:
+def test_a_new_run_clears_the_comparison_of_the_former_result(tmp_path) -> None:
     folder = tmp_path / "result"
     (folder / "comparison").mkdir(parents=True)
-    (folder / "study.toml").write_text((along_yarns.folder / "study.toml").read_text())
+    (folder / "study.toml").write_text(f"# {RESOLVED}\n")
     for name in ("comparison.json", "outline.png", "notes.txt"):
         (folder / "comparison" / name).write_text("former")
     claim_folder(folder)
