@@ -7,6 +7,7 @@ from typing import Any
 
 from weftform.cli.cards import cards
 from weftform.cli.check import check
+from weftform.cli.compare import compare
 from weftform.cli.doctor import doctor
 from weftform.cli.new import new
 from weftform.cli.probe import probe
@@ -21,6 +22,7 @@ VERBS: dict[str, Callable[..., Any]] = {
     "run": run,
     "view": view,
     "probe": probe,
+    "compare": compare,
     "studies": studies,
     "cards": cards,
     "reproduce": reproduce,
