@@ -8,6 +8,7 @@ from typing import Any
 from weftform.cli.cards import cards
 from weftform.cli.check import check
 from weftform.cli.doctor import doctor
+from weftform.cli.identify import identify
 from weftform.cli.new import new
 from weftform.cli.probe import probe
 from weftform.cli.reproduce import reproduce
@@ -23,6 +24,7 @@ VERBS: dict[str, Callable[..., Any]] = {
     "probe": probe,
     "studies": studies,
     "cards": cards,
+    "identify": identify,
     "reproduce": reproduce,
     "doctor": doctor,
 }
