@@ -185,11 +185,11 @@ def _law_figure(found: Identification) -> Figure | None:
         axes.axvline(found.covered_deg, color=FAINT, lw=0.9, ls=":")
         axes.annotate(
             "curves end ",
-            (found.covered_deg, 0.97),
+            (found.covered_deg, 0.03),
             xycoords=("data", "axes fraction"),
             rotation=90,
             ha="right",
-            va="top",
+            va="bottom",
             size=7.5,
             color=FAINT,
         )
@@ -211,8 +211,8 @@ def _correlation_figure(found: Identification) -> Figure:
     matrix = found.uncertainty.correlation
     size = len(matrix)
     cell = 0.52
-    figure = new_figure(2.2 + size * cell + 0.4, 1.9 + size * cell + 0.5)
-    axes = place(figure, 2.0, 1.55, size * cell, size * cell)
+    figure = new_figure(2.2 + size * cell + 0.4, 1.5 + size * cell + 0.6)
+    axes = place(figure, 2.0, 1.4, size * cell, size * cell)
     axes.imshow(np.nan_to_num(matrix), vmin=-1.0, vmax=1.0, cmap="RdBu_r")
     for a in range(size):
         for b in range(size):

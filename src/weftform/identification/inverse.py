@@ -40,6 +40,8 @@ from weftform.laboratory.specimen import Reading
 from weftform.study.study import Study
 
 Method = Literal["least-squares", "global"]
+BETWEEN_PICTURES = 3.0
+"""Seconds between two pictures of the current curve, so that quick simulations do not wait for them."""
 
 
 @dataclass(frozen=True)
@@ -249,11 +251,15 @@ def identify(
             best = min((i.misfit for i in objective.iterates), default=np.inf)
             watch(Progress(evaluations.done, evaluations.reused, last, best, accepted, names))
 
+    drawn = -np.inf
+
     def accept(_: Iterate) -> None:
-        if figures:
+        nonlocal drawn
+        if figures and time.perf_counter() - drawn > BETWEEN_PICTURES:
             from weftform.identification.figures import draw_current
 
             draw_current(objective, studies, folder / "current.png")
+            drawn = time.perf_counter()
         tell(True)
 
     workers = jobs_for(jobs, len(parameters) * len(studies))
