@@ -82,7 +82,7 @@ def test_polynomial_modulus_is_recovered_from_50_percent_off_through_noise(tmp_p
     inner = angle[angle > np.radians(2.0)]
     np.testing.assert_allclose(noisy.fabric.shear.shear_stress(inner), true.shear_stress(inner), rtol=0.02)
     # the interval covers the law at nearly all angles; its level is 95 % at each of them
-    angles, modulus, lower, upper = band(noisy)
+    angles, _, lower, upper = band(noisy)
     covered = (lower <= true.modulus(np.radians(angles))) & (true.modulus(np.radians(angles)) <= upper)
     assert covered.mean() > 0.7
 
@@ -123,7 +123,7 @@ def test_one_aspect_ratio_predicts_the_others(tmp_path):
 def test_bias_and_tensile_curves_at_once(tmp_path):
     """Shear from the one, tension from the other, both from 50 % off, with simulations of both."""
     bias = {**QUICK, "fabric.override.shear": CONSTANT}
-    strip = Study.load("tensile-warp")
+    strip = Study.load("tensile-warp", {"specimen.cell_length_mm": 10.0})
     history = run(strip, tmp_path / "strip", threads=1).history
     pull = tmp_path / "pull.csv"
     rows = [f"{d},{f}" for d, f in zip(history["displacement_mm"], history["force_N"], strict=True)]
@@ -131,7 +131,7 @@ def test_bias_and_tensile_curves_at_once(tmp_path):
     soft = {**bias, "fabric.override.tension.warp.coefficients": [0.5 * c for c in (19.75, -123.13, 573.0, -91.645)]}
     found = identify(
         Study.load("bias-extension", soft),
-        [measured(tmp_path / "machine", bias), Target(pull, "tensile-warp")],
+        [measured(tmp_path / "machine", bias), Target(pull, strip)],
         ["shear.G12=1.0", "tension.scale"],
         out=tmp_path / "out",
         jobs=2,
@@ -163,7 +163,7 @@ def test_killed_identification_resumes_and_leaves_no_process(tmp_path):
     out = tmp_path / "out"
     words = ["identify", str(study), "--target", str(file), "--fit", "shear.table=1,intervals=4", "--out", str(out)]
     words += ["--jobs", "2", "--no-figures"]
-    child = subprocess.Popen([sys.executable, "-m", "weftform", *words], stderr=subprocess.DEVNULL)
+    child = subprocess.Popen([sys.executable, "-c", "from weftform.cli import main; main()", *words])
     deadline = time.monotonic() + 300
     while time.monotonic() < deadline and child.poll() is None:
         if (out / LOG).exists() and len((out / LOG).read_bytes().splitlines()) >= 4:
