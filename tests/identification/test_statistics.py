@@ -32,7 +32,7 @@ def test_intervals_of_a_straight_line_are_those_of_the_textbook():
     assert found.correlation[0, 1] == pytest.approx(-x.mean() / np.sqrt((x**2).mean()), rel=1e-9)
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.6])
+@pytest.mark.parametrize("memory", [0.0, 0.6, 0.8])
 def test_intervals_cover_the_truth_when_errors_are_correlated(memory):
     """95 % intervals of 400 noisy lines cover the slope in 91 to 99 % of cases (four standard errors of the count are
     4.4 %); with neighbours that err alike too."""
@@ -99,3 +99,15 @@ def test_insensitive_parameter_and_one_at_its_bound_are_named():
     assert any("stuck ends at its bound" in w for w in found.warnings)
     assert np.isfinite(found.standard_errors[0])
     assert np.isinf(found.standard_errors[1]) and np.isnan(found.standard_errors[2])
+
+
+def test_model_that_does_not_follow_is_said():
+    """A straight line through a parabola: a systematic error, which no interval of the line can hold."""
+    x = np.linspace(0.0, 1.0, 100)
+    a = np.column_stack([np.ones(100), x])
+    values = np.linalg.lstsq(a, x**2, rcond=None)[0]
+    parameters = [linear("a"), linear("b")]
+    found = uncertainty(a * [p.size for p in parameters], [a @ values - x**2], [1.0], parameters, list(values))
+    assert any("systematic" in w for w in found.warnings)
+    # rough, but within an order of magnitude of the parabola, not nothing and not everything
+    assert (found.upper - found.lower < 10.0).all() and (found.upper - found.lower > 0.1).all()

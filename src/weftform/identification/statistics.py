@@ -19,6 +19,9 @@ INSENSITIVE = 1.0e-3
 """A parameter that moves the curves by a smaller share than this of its own relative change is not seen in them."""
 NEAR_BOUND = 1.0e-3
 """Share of the way between its bounds at which a parameter counts as at its bound."""
+SYSTEMATIC = 0.9
+SMALL_MISFIT = 2.0e-3
+"""Neighbouring residuals correlated by more than the first, with a misfit above the second: the model is at fault."""
 MOST_CORRELATION = 0.99
 """Largest correlation of neighbouring residuals that is believed; beyond it a curve would hold no information."""
 
@@ -76,7 +79,9 @@ def uncertainty(
     Weighted least squares (Seber and Wild, Nonlinear Regression, 1989, ch. 5) with a variance ``s^2`` for each curve:
     the covariance is ``(J'J)^-1 (sum_k s_k^2 J_k' J_k) (J'J)^-1``, which for one curve is ``s^2 (J'J)^-1``.
     Neighbouring residuals of a measured curve err alike, so n of them count as ``n (1 - r) / (1 + r)`` independent
-    ones, with ``r`` the correlation of neighbours (first-order autoregressive errors: Bayley and Hammersley 1946).
+    ones, with ``r`` the correlation of neighbours (first-order autoregressive errors: Bayley and Hammersley 1946); but
+    not for fewer than half the runs of one sign, which a model that cannot follow its curve still leaves. Intervals
+    are rough then, and a warning says so.
 
     Parameters
     ----------
@@ -96,9 +101,12 @@ def uncertainty(
     at_bound = np.array([_at_bound(p, v) for p, v in zip(parameters, values, strict=True)])
     free = ~at_bound
     neighbours = [_neighbour_correlation(r) for r in residuals]
-    independent = np.array([len(r) * (1.0 - c) / (1.0 + c) for r, c in zip(residuals, neighbours, strict=True)])
+    independent = np.array(
+        [max(len(r) * (1.0 - c) / (1.0 + c), 0.5 * _runs(r)) for r, c in zip(residuals, neighbours, strict=True)]
+    )
     freedom = max(float(independent.sum()) - int(free.sum()), 1.0)
     variances = [float(r @ r) / (n * freedom / independent.sum()) for r, n in zip(residuals, independent, strict=True)]
+    misfit = float(np.sqrt(sum(float(r @ r) for r in residuals) / sum(weights)))
     length = np.linalg.norm(jacobian, axis=0)
     relative = np.array([abs(v) / p.slope(v) if v else 1.0 for p, v in zip(parameters, values, strict=True)])
     sensitivity = length * relative / np.sqrt(sum(weights))
@@ -146,6 +154,11 @@ def uncertainty(
         for b in range(a):
             if abs(correlation[a, b]) > HIGH_CORRELATION:
                 warnings.append(f"{names[b]} and {names[a]} are correlated by {correlation[a, b]:.3f}")
+    if max(neighbours) > SYSTEMATIC and misfit > SMALL_MISFIT:
+        warnings.append(
+            f"the errors are systematic (neighbours correlated by {max(neighbours):.3f}): the model does not follow the "
+            "curves, and the intervals are rough"
+        )
     quantile = float(t.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
     lower, upper = _interval(parameters, values, quantile * errors)
     for k, name in enumerate(names):
@@ -175,6 +188,12 @@ def _neighbour_correlation(residuals: Floats) -> float:
     """Correlation of neighbouring residuals of a curve about zero; nought where it is negative."""
     squares = float(0.5 * (residuals[1:] @ residuals[1:] + residuals[:-1] @ residuals[:-1]))
     return min(max(float(residuals[1:] @ residuals[:-1]) / squares, 0.0), MOST_CORRELATION) if squares > 0.0 else 0.0
+
+
+def _runs(residuals: Floats) -> int:
+    """How many stretches of one sign there are."""
+    signs = residuals > 0.0
+    return 1 + int((signs[1:] != signs[:-1]).sum())
 
 
 def _interval(parameters: Sequence[Parameter], values: Sequence[float], half: Floats) -> tuple[Floats, Floats]:
