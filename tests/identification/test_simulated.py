@@ -141,6 +141,37 @@ def test_bias_and_tensile_curves_at_once(tmp_path):
 
 
 @pytest.mark.slow
+def test_friction_of_the_holder_is_recovered_from_the_punch_force(tmp_path):
+    """A key of the study instead of the card, and a force that flutters with contact: it is of one size
+    along the stroke, so errors count as shares of the largest force. 5 % are allowed to the friction for it."""
+    press = {
+        "blank.cell_length_mm": 7.5,
+        "loading.stroke_mm": 20.0,
+        "loading.duration_s": 0.15,
+        "output.rows": 61,
+        "output.frames": 2,
+    }
+    study = Study.load("hemisphere-0-90", press)
+    history = run(study, tmp_path / "press", threads=1).history
+    moving = history["displacement_mm"] > 0.0
+    file = tmp_path / "force.csv"
+    rows = [f"{d},{f}" for d, f in zip(history["displacement_mm"][moving], history["force_N"][moving], strict=True)]
+    file.write_text("\n".join(["displacement_mm,force_N", *rows]) + "\n")
+    found = identify(
+        study,
+        [file],
+        ["contact.blank_holder.friction=0.1"],
+        out=tmp_path / "out",
+        weighting="uniform",
+        jobs=1,
+        figures=False,
+    )
+    assert found.card is None
+    assert found.values[0] == pytest.approx(0.2, rel=0.05)
+    assert found.study.model.contact["blank_holder"].friction == found.values[0]
+
+
+@pytest.mark.slow
 def test_processes_change_nothing(tmp_path):
     study = Study.load("bias-extension", {**QUICK, "fabric.override.shear": CONSTANT})
     file = measured(tmp_path / "machine", {**QUICK, "fabric.override.shear": CONSTANT}, noise=0.02)

@@ -72,7 +72,7 @@ def draw_identification(found: Identification) -> list[Path]:
 def _short(words: str, most: int = 240) -> str:
     import textwrap
 
-    return "\n".join(textwrap.wrap(textwrap.shorten(words, most, placeholder=" ..."), 95))
+    return "\n".join(textwrap.wrap(textwrap.shorten(words, most, placeholder=" ..."), 84))
 
 
 def _curves_figure(

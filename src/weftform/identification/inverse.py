@@ -22,6 +22,7 @@ from weftform.identification.optimising import (
     global_search,
     least_squares,
     require_optuna,
+    step_for,
 )
 from weftform.identification.preparing import (
     CARD,
@@ -264,7 +265,7 @@ def identify(
 
     workers = jobs_for(jobs, len(parameters) * len(studies))
     with Evaluations(simulated, families, folder, workers, lambda *_: tell(False)) as evaluations:
-        objective = Objective(evaluations, curves, parameters, accept)
+        objective = Objective(evaluations, curves, parameters, accept, step_for(simulated))
         start = np.zeros(len(parameters))
         if method == "global":
             start = global_search(objective, trials, seed)

@@ -13,10 +13,14 @@ from weftform.identification.evaluations import Evaluations, Point
 from weftform.identification.fits import Parameter
 from weftform.identification.targets import Curve
 from weftform.identification.worker import Outcome
+from weftform.study.schema import FormingModel
+from weftform.study.study import Study
 
 STEP = 0.01
 """Change of a coordinate for a derivative. The force of an explicit run carries vibrations of some 1e-4 of it that
 change with any parameter; a step of 1 % keeps them out, and the force is nearly linear in a stiffness."""
+CONTACT_STEP = 0.1
+"""The same where contact makes the force flutter by per cents: a smaller one would see the flutter only."""
 COST_TOLERANCE = 1.0e-4
 """Relative change of the sum of squares below which the fit has ended."""
 STEP_TOLERANCE = 1.0e-4
@@ -51,16 +55,27 @@ class Iterate:
 Watch = Callable[[Iterate], None]
 
 
+def step_for(studies: Sequence[Study]) -> float:
+    """Change of a coordinate for a derivative: larger where one of the studies has contact."""
+    return CONTACT_STEP if any(isinstance(study.model, FormingModel) for study in studies) else STEP
+
+
 class Objective:
     """Residuals of the curves as a function of the coordinates of the parameters."""
 
     def __init__(
-        self, evaluations: Evaluations, curves: Sequence[Curve], parameters: Sequence[Parameter], watch: Watch
+        self,
+        evaluations: Evaluations,
+        curves: Sequence[Curve],
+        parameters: Sequence[Parameter],
+        watch: Watch,
+        step: float = STEP,
     ) -> None:
         self.evaluations = evaluations
         self.curves = tuple(curves)
         self.parameters = tuple(parameters)
         self.watch = watch
+        self.step = step
         self.iterates: list[Iterate] = []
         self.total_weight = sum(c.weight for c in curves)
         self.count = sum(len(c.force) for c in curves)
@@ -97,7 +112,7 @@ class Objective:
         columns = np.full((self.count, len(x)), np.nan)
         left = list(range(len(x)))
         for side in (1.0, -1.0):
-            tried = [(k, other) for k in left if (other := self._beside(x, k, side * STEP)) is not None]
+            tried = [(k, other) for k in left if (other := self._beside(x, k, side)) is not None]
             found = self.evaluations.at([self.point(other) for _, other in tried])
             for (k, other), outcome in zip(tried, found, strict=True):
                 there = self.residuals_of(outcome)
@@ -112,13 +127,14 @@ class Objective:
             )
         return columns
 
-    def _beside(self, x: Floats, k: int, step: float) -> Floats | None:
+    def _beside(self, x: Floats, k: int, side: float) -> Floats | None:
         """Coordinates with one of them changed; None where that leads out of its bounds."""
         parameter = self.parameters[k]
+        low, high = parameter.normalised(parameter.lower), parameter.normalised(parameter.upper)
         other = np.array(x, float)
-        other[k] += step
-        within = parameter.normalised(parameter.lower) <= other[k] <= parameter.normalised(parameter.upper)
-        return other if within else None
+        # no more than half the way between the bounds, so that one side is always within
+        other[k] += side * min(self.step, 0.49 * (high - low))
+        return other if low <= other[k] <= high else None
 
     def accept(self, values: Point, residuals: Floats, outcomes: Sequence[Outcome]) -> None:
         """Enter a point that the optimiser goes on from, unless it is the last one already."""
