@@ -9,6 +9,7 @@ from weftform.cli.cards import cards
 from weftform.cli.check import check
 from weftform.cli.compare import compare
 from weftform.cli.doctor import doctor
+from weftform.cli.identify import identify
 from weftform.cli.new import new
 from weftform.cli.probe import probe
 from weftform.cli.reproduce import reproduce
@@ -25,6 +26,7 @@ VERBS: dict[str, Callable[..., Any]] = {
     "compare": compare,
     "studies": studies,
     "cards": cards,
+    "identify": identify,
     "reproduce": reproduce,
     "doctor": doctor,
 }

@@ -17,6 +17,9 @@ from weftform.errors import CardError
 
 Floats = NDArray[np.float64]
 
+ROUNDING = 1.0e-12
+"""Slope, as a share of the steepest, below which a law counts as level."""
+
 
 class Law(Protocol):
     """A function on ``x >= 0`` with ``value(0) = 0``, straight beyond ``valid_to``."""
@@ -193,7 +196,8 @@ def first_fall(law: Law, upper: float, samples: int = 4001) -> Monotony | None:
     """First interval of ``(0, upper]`` where the law falls, or None if it rises throughout."""
     x = np.linspace(0.0, upper, samples)[1:]
     slope = law.slope(x)
-    falling = slope < 0.0
+    # where a table is level its slope is nought but for rounding
+    falling = slope < -ROUNDING * float(np.abs(slope).max())
     if not falling.any():
         return None
     first = int(np.argmax(falling))
