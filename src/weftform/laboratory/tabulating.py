@@ -10,6 +10,10 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats, TabulatedLaw, first_fall
 
+FIRST_KNOT = 0.01
+"""Share of the range within which the first knot lies, where there are points so near to the origin: dry friction
+lets a shear test start with a step, which a first knot further off would smear over the first degrees."""
+
 Design = Callable[[Floats, Callable[[Floats], Floats]], Floats]
 """From the points of a specimen and a basis to the linear map from coefficients to measured values."""
 
@@ -53,7 +57,8 @@ def fit_table(
     is level.
 
     The unknowns are the increments from knot to knot, none negative: non-negative least squares, with every
-    specimen of the same weight. Knots are spread so that as many points lie between any two.
+    specimen of the same weight. Knots are spread so that as many points lie between any two, but for the first,
+    which lies near the origin (:data:`FIRST_KNOT`).
 
     Raises
     ------
@@ -67,7 +72,9 @@ def fit_table(
     if points < 4 or knots < 2:
         raise MeasurementError("too few points for a table", expected="4 points and 2 knots at least", got=f"{points}")
     count = min(knots, points // 2)
-    places = np.unique(np.append(np.quantile(everything, np.linspace(0.0, 1.0, count + 1)[1:-1]), valid_to))
+    first = everything[everything >= FIRST_KNOT * valid_to].min(initial=valid_to)
+    spread = np.quantile(everything, np.linspace(0.0, 1.0, count + 1)[1:-1])
+    places = np.unique(np.concatenate([[first], spread[spread > first], [valid_to]]))
     places = np.concatenate([[0.0], places[(places > 1e-6 * valid_to) & (places <= valid_to)]])
 
     def increments(x: Floats) -> Floats:
