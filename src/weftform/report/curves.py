@@ -62,7 +62,11 @@ def force_figure(result: Result, frame: int, force: str = "Force") -> Figure:
     axes.set_ylim(min(0.0, 1.1 * float(newtons.min())), 1.12 * float(newtons.max()) or 1.0)
     axes.set_ylabel(f"{force}  [N]")
     forming = result.study.model.kind == "forming"
-    note = "Whole blank, friction included; mean over each output interval." if forming else "Value at each output instant."
+    note = (
+        "Whole blank, friction included; mean over each output interval."
+        if forming
+        else "Value at each output instant."
+    )
     headline(figure, f"{force} against {way_word(result)}", run_words(result, frame, note))
     return figure
 
