@@ -381,7 +381,7 @@ def beyond_the_laws(fields: Fields) -> list[str]:
     if beyond.any():
         part = float(share[here][beyond].sum() / share[here].sum())
         notes.append(
-            f"{100 * part:.2g} % of the area shears beyond {np.degrees(fabric.shear.valid_to):.3g} deg, where the shear law "
+            f"{100 * part:.3g} % of the area shears beyond {np.degrees(fabric.shear.valid_to):.3g} deg, where the shear law "
             f"of the card ends (largest {np.degrees(angle.max()):.3g} deg): there it is continued by a straight line"
         )
     for name, law, strain in (("warp", fabric.warp, fields.warp_strain), ("weft", fabric.weft, fields.weft_strain)):

@@ -194,6 +194,7 @@ def real_frames(results: Results) -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     for axes in panels[len(tables) :]:
         axes.axis("off")
+        panels[len(panels) // 2 - 1].tick_params(labelbottom=True)  # the axis of the panel above
         axes.legend(handles, labels, loc="center", frameon=False)
     figure.supxlabel("Shear angle [deg]", fontsize=10)
     figure.supylabel("Normalised shear force [N/mm]", fontsize=10)
