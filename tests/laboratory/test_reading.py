@@ -116,9 +116,17 @@ def test_thousands_marks() -> None:
     assert number("1.234,5", True) == 1234.5
     assert number("-1.5e-3", False) == -1.5e-3
     assert number("n/a", False) is None
-    for bad in ("1.2.3", "1e400", "12 N", "0x10"):
+    assert number("1,234,567", False) == 1234567.0
+    # a lone mark between three digits and more could be either
+    for bad in ("1.2.3", "1e400", "12 N", "0x10", "0,100", "1,234", "12,34.5", "1,23,456"):
         with pytest.raises(ValueError):
             number(bad, False)
+
+
+def test_blanks_between_thousands(text) -> None:
+    rows = [f"{k};1{blank}0{k}0,5" for k, blank in zip(range(9), " \u00a0\u202f" * 3, strict=True)]
+    table = read_table(text("a.csv", "\n".join(["displacement_mm;force_N", *rows])), NEEDED)
+    np.testing.assert_allclose(table.values[Quantity.FORCE], 1000.5 + 10.0 * np.arange(9))
 
 
 @given(st.floats(-1e6, 1e6, allow_nan=False), st.booleans())

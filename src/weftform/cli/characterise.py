@@ -34,6 +34,7 @@ from weftform.cli.characterise_options import (
     Weighting,
     WeightingChoice,
     Zero,
+    count_of,
     defaults_of,
     figure_folder,
     interval_of,
@@ -107,9 +108,7 @@ def tensile(
             knots=knots,
             reading=reading_of(preset, column, unit, only, zero),
         )
-        typer.echo(
-            f"Tensile test along the {direction.value}: {len(found.specimens)} specimens, {found.fit.points} points"
-        )
+        typer.echo(f"Tensile test along the {direction.value}: {count_of(found.specimens)}, {found.fit.points} points")
         s = found.stages
         typer.echo(
             f"  crimp to {s.crimp_end:.3f} mm, linear to {s.linear_end:.3f} mm at {s.linear_stiffness:.5g} "
@@ -206,7 +205,7 @@ def bias_extension(
             reading=reading_of(preset, column, unit, only, zero),
         )
         typer.echo(
-            f"Bias-extension test {height:g} x {width:g} mm: {len(found.specimens)} specimens, "
+            f"Bias-extension test {height:g} x {width:g} mm: {count_of(found.specimens)}, "
             f"{found.shear.fit.points} points, {found.angle_source} angle"
         )
         if found.slip is not None:
@@ -290,8 +289,7 @@ def picture_frame(
             reading=reading_of(preset, column, unit, only, zero),
         )
         typer.echo(
-            f"Picture-frame test, {found.measured} data: {len(found.specimens)} specimens, "
-            f"{found.shear.fit.points} points"
+            f"Picture-frame test, {found.measured} data: {count_of(found.specimens)}, {found.shear.fit.points} points"
         )
         say_shear(found.shear, "N/mm" if found.measured == "normalised" else "N")
         say_warnings(found.warnings)

@@ -247,6 +247,10 @@ def say_shear(shear: ShearCurve, residual: str = "N") -> None:
     typer.echo(f"    ({shear.stages.criterion})")
 
 
+def count_of(specimens: Sequence[object]) -> str:
+    return f"{len(specimens)} specimen{'' if len(specimens) == 1 else 's'}"
+
+
 def say_warnings(warnings: Sequence[str]) -> None:
     for warning in warnings:
         typer.echo(f"warning: {warning}", err=True)
