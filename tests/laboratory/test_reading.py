@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from weftform.errors import MeasurementError
 from weftform.laboratory import Quantity, read_table, sample, sample_names
+from weftform.laboratory.presets import PRESETS
 from weftform.laboratory.text import number
 from weftform.laboratory.units import Dimension, split_unit, unit_factor
 
@@ -143,3 +144,10 @@ def test_units() -> None:
     assert split_unit("Displacement / mm") == ("Displacement", "mm")
     assert split_unit("shear_angle_deg") == ("shear_angle", "deg")
     assert split_unit("plain") == ("plain", None)
+
+
+@pytest.mark.parametrize("quantity", list(Quantity))
+@pytest.mark.parametrize("preset", ["generic", "instron", "aramis", "vic3d"])
+def test_every_quantity_is_known_by_its_own_name(quantity, preset) -> None:
+    """A message that asks for a column ``shift_x_mm`` must be content with one."""
+    assert PRESETS[preset].quantity_of(split_unit(quantity.value)[0]) is quantity

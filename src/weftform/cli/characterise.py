@@ -310,3 +310,36 @@ def picture_frame(
             from weftform.laboratory.figures import draw_picture_frame
 
             say_files(draw_picture_frame(found, folder))
+
+
+@app.command("shear-map")
+def shear_map(
+    file: Annotated[Path, typer.Argument(help="Full-field export of one stage: positions and displacements.")],
+    warp_deg: Annotated[float, typer.Option("--warp-deg", help="Direction of the warp from the x axis [deg].")] = 45.0,
+    png: Annotated[Path | None, typer.Option("--png", help="Picture to write (default: FILE-shear.png here).")] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Table to write: x_mm, y_mm and shear_angle_deg of each triangle.")
+    ] = None,
+    preset: Preset = "auto",
+    column: Columns = None,
+    unit: Units = None,
+) -> None:
+    """Shear-angle map of a full-field (DIC) export: GOM Aramis, VIC-3D or generic."""
+    with reported():
+        from weftform.laboratory.figures import draw_shear_field
+        from weftform.laboratory.full_field import read_shear_field
+        from weftform.result.writer import write_whole
+
+        field = read_shear_field(file, warp_deg=warp_deg, reading=reading_of(preset, column, unit, None, False))
+        typer.echo(
+            f"Shear angle of {file.name}: {len(field.angle)} triangles, mean {field.angle.mean():.2f} deg, from "
+            f"{field.angle.min():.2f} to {field.angle.max():.2f} deg"
+        )
+        say_warnings(field.warnings)
+        if table is not None:
+            rows = zip(field.x, field.y, field.angle, strict=True)
+            write_whole(
+                table, "x_mm,y_mm,shear_angle_deg\n" + "".join(f"{x:.4f},{y:.4f},{g:.4f}\n" for x, y, g in rows)
+            )
+            typer.echo(f"  table {table}")
+        say_files([draw_shear_field(field, Path(f"{file.stem}-shear.png") if png is None else png, file.name)])

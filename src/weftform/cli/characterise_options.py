@@ -106,6 +106,9 @@ def reported() -> Iterator[None]:
     except WeftformError as problem:
         typer.echo(str(problem), err=True)
         raise typer.Exit(problem.exit_code) from None
+    except OSError as problem:
+        typer.echo(f"{problem.filename}: cannot be written ({problem.strerror})", err=True)
+        raise typer.Exit(2) from None
 
 
 def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, str]:
