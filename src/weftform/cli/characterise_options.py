@@ -106,6 +106,9 @@ def reported() -> Iterator[None]:
     except WeftformError as problem:
         typer.echo(str(problem), err=True)
         raise typer.Exit(problem.exit_code) from None
+    except OSError as problem:
+        typer.echo(f"{problem.filename}: cannot be written ({problem.strerror})", err=True)
+        raise typer.Exit(2) from None
 
 
 def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, str]:
@@ -245,6 +248,10 @@ def say_shear(shear: ShearCurve, residual: str = "N") -> None:
     locking = f"{shear.stages.locking_deg:.1f} deg" if shear.stages.locking_deg is not None else "not reached"
     typer.echo(f"  placing to {shear.stages.placing_end_deg:.1f} deg, locking angle {locking}")
     typer.echo(f"    ({shear.stages.criterion})")
+
+
+def count_of(specimens: Sequence[object]) -> str:
+    return f"{len(specimens)} specimen{'' if len(specimens) == 1 else 's'}"
 
 
 def say_warnings(warnings: Sequence[str]) -> None:

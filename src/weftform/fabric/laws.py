@@ -17,9 +17,6 @@ from weftform.errors import CardError
 
 Floats = NDArray[np.float64]
 
-ROUNDING = 1.0e-12
-"""Slope, as a share of the steepest, below which a law counts as level."""
-
 
 class Law(Protocol):
     """A function on ``x >= 0`` with ``value(0) = 0``, straight beyond ``valid_to``."""
@@ -192,11 +189,14 @@ class Monotony:
     steepest_fall: float
 
 
+ROUNDING = 1e-12
+"""Share of the steepest slope below which a fall is rounding: a rising table may end level."""
+
+
 def first_fall(law: Law, upper: float, samples: int = 4001) -> Monotony | None:
     """First interval of ``(0, upper]`` where the law falls, or None if it rises throughout."""
     x = np.linspace(0.0, upper, samples)[1:]
     slope = law.slope(x)
-    # where a table is level its slope is nought but for rounding
     falling = slope < -ROUNDING * float(np.abs(slope).max())
     if not falling.any():
         return None

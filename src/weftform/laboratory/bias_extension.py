@@ -32,6 +32,8 @@ from weftform.laboratory.tabulating import TableFit, fit_table
 from weftform.laboratory.tensile import LawKind, fit_warnings
 
 AngleSource = Literal["auto", "kinematic", "measured"]
+LEAST_TRAVEL_DEG = 1.0
+"""Kinematic angle that a bias-extension test reaches at least; one that ends before was read in wrong units."""
 ANGLE_DRAWS = 30
 """Times that a measured angle is drawn again from its noise, to see what it does to the law."""
 LARGEST_KINEMATIC_DEG = 60.0
@@ -285,8 +287,9 @@ def _fit(
 
 
 def _check_travel(specimens: Sequence[Specimen], height: float, width: float) -> None:
-    """A bias specimen cannot be pulled to twice the length at which its yarns are parallel."""
+    """A bias specimen is pulled by more than nothing, and not to twice the length at which its yarns are parallel."""
     most = 2.0 * kinematic_limit(height, width)
+    least = float(kinematic_displacement(np.radians(LEAST_TRAVEL_DEG), height, width))
     for s in specimens:
         if s.x[-1] > most:
             raise MeasurementError(
@@ -297,6 +300,16 @@ def _check_travel(specimens: Sequence[Specimen], height: float, width: float) ->
                 expected=f"at most {most:.4g} mm (yarns are parallel at {most / 2:.4g} mm)",
                 got=f"{s.x[-1]:.6g} mm",
                 hint="are displacement and force swapped, or the units wrong?",
+            )
+        if s.x[-1] < least:
+            raise MeasurementError(
+                f"{s.name}: the test ends at {s.x[-1]:.4g} mm, before a bias-extension specimen of {height:g} x {width:g} mm "
+                "has sheared at all",
+                file=s.file,
+                line=int(s.lines[-1]),
+                expected=f"at least {least:.3g} mm ({LEAST_TRAVEL_DEG:g} deg)",
+                got=f"{s.x[-1]:.6g} mm",
+                hint="is the displacement in metres or in inches? --unit displacement=m",
             )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from weftform.errors import MeasurementError
-from weftform.laboratory.units import Dimension
+from weftform.laboratory.units import Dimension, split_unit
 
 
 class Quantity(Enum):
@@ -148,7 +148,7 @@ class Preset:
             for quantity, names in spellings.items():
                 if name in names:
                     return quantity
-        return None
+        return next((q for q in Quantity if name == plain(split_unit(q.value)[0])), None)
 
 
 def plain(header: str) -> str:

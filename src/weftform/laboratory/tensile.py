@@ -22,6 +22,8 @@ from weftform.laboratory.stages import TensileStages, tensile_stages
 from weftform.laboratory.tabulating import TableFit, fit_table
 
 LawKind = Literal["polynomial", "tabulated"]
+LEAST_STRAIN = 1e-4
+"""Elongation over gauge length that a tensile test reaches at least; less was read in wrong units."""
 LARGEST_STRAIN = 0.5
 """A woven reinforcement pulled along its yarns breaks far below this nominal strain."""
 
@@ -159,6 +161,15 @@ def characterise_tensile(
                 expected=f"at most {LARGEST_STRAIN * length:g} mm",
                 got=f"{s.x[-1]:.6g} mm",
                 hint="are displacement and force swapped, or the units wrong? --column displacement=..., --unit ...",
+            )
+        if s.x[-1] < LEAST_STRAIN * length:
+            raise MeasurementError(
+                f"{s.name}: the test ends at an elongation of {s.x[-1]:.4g} mm",
+                file=s.file,
+                line=int(s.lines[-1]),
+                expected=f"at least {LEAST_STRAIN * length:g} mm on {length:g} mm",
+                got=f"{s.x[-1]:.6g} mm",
+                hint="is the displacement in metres or in inches? --unit displacement=m",
             )
     warnings = [w for s in specimens for w in s.warnings]
     mean = average(specimens)
