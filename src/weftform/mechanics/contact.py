@@ -29,9 +29,9 @@ def rounded_edge(
     outside_u = max(u, 0.0)
     outside_w = max(w, 0.0)
     squared = outside_u * outside_u + outside_w * outside_w
-    inverse = inverse_root(max(squared, TINY))
-    depth = min(max(u, w), 0.0)
     deep = 1.0 if squared < TINY else 0.0
+    inverse = (1.0 - deep) * inverse_root(max(squared, TINY))
+    depth = min(max(u, w), 0.0)
     flat = deep if w >= u else 0.0
     normal_u = outside_u * inverse + (deep - flat)
     normal_w = outside_w * inverse + flat

@@ -12,8 +12,8 @@ import numpy as np
 from weftform.mechanics.contact import coulomb, rounded_edge
 from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
-from weftform.solver.rows import LEAD, row_loop, sum_lanes
-from weftform.solver.vector_width import use_full_width
+from weftform.solver.rows import LEAD, sum_lanes
+from weftform.solver.vector_loops import row_loop, use_full_width
 
 SMALL = 1.0e-24
 """Square of a distance from the axis [mm2] below which there is no radial direction."""

@@ -82,7 +82,8 @@ def _sweep_band(
     ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges
     (wider by what its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
     ``pieces`` holds for each tool and row how many pieces of it can touch, then where each begins, its length and
-    kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of damping and of friction with each tool.
+    kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of
+    damping and of friction with each tool.
     """
     flush_subnormals()
     for k in range(block):

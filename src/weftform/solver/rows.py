@@ -14,46 +14,20 @@ the crossings, and heats.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numba
 import numpy as np
-from numba.core.compiler import Compiler
 
-from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.connector import connector_force
 from weftform.mechanics.membrane import SMALLEST_AREA_RATIO, shear_stress
 from weftform.mechanics.piecewise import polynomial
 from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
-from weftform.solver.vector_width import use_full_width
+from weftform.solver.vector_loops import row_loop, use_full_width
 
 U1 = np.uint64(1)
 LEAD = np.uint64(at.LEAD)
 LANES = np.uint64(at.LANES)
-
-
-class SeparateArrays(Compiler):
-    """Numba's compiler, told that no two array arguments overlap.
-
-    The vectoriser otherwise guards each loop with a check of every pair of arrays, and takes the scalar loop where a
-    row is too short to be worth the checks.
-    """
-
-    def __init__(
-        self, typingctx: Any, targetctx: Any, library: Any, args: Any, return_type: Any, flags: Any, locals: Any
-    ):
-        flags.noalias = True
-        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
-
-
-def row_loop(function: Callable[..., Any]) -> Any:
-    """Compile a loop over one row so that it is inlined where its constants are known.
-
-    No two of its array arguments may overlap.
-    """
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True, pipeline_class=SeparateArrays)(function)
 
 
 @row_loop

@@ -12,7 +12,8 @@ from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent
 from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
 from weftform.solver import layout as at
-from weftform.solver.rows import U1, row_loop
+from weftform.solver.rows import U1
+from weftform.solver.vector_loops import row_loop
 
 # what a survey returns
 WARP_STRAIN = 0
