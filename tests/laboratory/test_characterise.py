@@ -149,7 +149,7 @@ def test_card_without_a_change_is_the_same_bytes(tmp_path) -> None:
         (["--thickness", "0.5"], "the card says 0.62, the option 0.5"),
         (["--name", "other"], "the option says other"),
         (["--height", "90"], "height / width >= 2"),
-        (["--column", "force"], "QUANTITY=VALUE"),
+        (["--column", "force"], "NAME=VALUE"),
         (["--column", "force=nowhere"], "no column for force_N"),
         (["--unit", "force=mm"], "no unit of force_N"),
         (["--only", "nobody", "--preset", "zwick"], "no reader preset"),

@@ -8,12 +8,12 @@ import pytest
 from weftform.execution import run
 from weftform.fabric import Fabric
 from weftform.laboratory.kinematics import bias_design, kinematic_angle
+from weftform.laboratory.scatter import point_scatter
 from weftform.reproduction.picture_frames import (
     TOGETHER,
     frame_runs,
     frame_tables,
     measured_bias,
-    point_scatter,
     virtual_curve,
     write_cards,
 )
@@ -32,14 +32,6 @@ def test_the_tables_are_those_of_seven_laboratories() -> None:
     assert sum(len(t.angle) for t in TABLES.values()) == 349
     assert all((np.diff(t.angle) > 0.0).all() for t in TABLES.values())
     assert len(TABLES["UT"].rising.angle) == 36  # its last point is a fall
-
-
-def test_scatter_of_points_is_their_noise() -> None:
-    """Known noise on a curve, unevenly sampled: the estimate has a standard error of about 1 / sqrt(n)."""
-    rng = np.random.default_rng(1)
-    x = np.sort(rng.uniform(0.0, 1.0, 4000))
-    assert point_scatter(x, np.exp(2.0 * x) + 0.01 * rng.standard_normal(x.size)) == pytest.approx(0.01, rel=0.06)
-    assert point_scatter(x, 3.0 * x + 1.0) < 1e-12
 
 
 @pytest.mark.parametrize("laboratory", TABLES)

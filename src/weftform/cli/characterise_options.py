@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from weftform.cli.options import pairs_of
 from weftform.errors import MeasurementError, WeftformError
 
 if TYPE_CHECKING:
@@ -111,16 +112,6 @@ def reported() -> Iterator[None]:
         raise typer.Exit(2) from None
 
 
-def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, str]:
-    pairs = {}
-    for text in texts or ():
-        key, equals, value = text.partition("=")
-        if not (equals and key.strip() and value.strip()):
-            raise MeasurementError(f"{option} {text} is not of the form QUANTITY=VALUE", expected=f"{option} force=...")
-        pairs[key.strip()] = value.strip()
-    return pairs
-
-
 def reading_of(
     preset: str,
     column: Sequence[str] | None,
@@ -130,7 +121,13 @@ def reading_of(
 ) -> Reading:
     from weftform.laboratory import Reading
 
-    return Reading(preset, _pairs(column, "--column"), _pairs(unit, "--unit"), tuple(only or ()), zero)
+    return Reading(
+        preset,
+        pairs_of(column, "--column", "force=HEADER"),
+        pairs_of(unit, "--unit", "force=kN"),
+        tuple(only or ()),
+        zero,
+    )
 
 
 def interval_of(start: float | None, end: float | None) -> tuple[float, float] | None:

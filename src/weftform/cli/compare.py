@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from weftform.cli.options import AsJson, ResultFolder
+from weftform.cli.options import AsJson, ResultFolder, pairs_of
 
 if TYPE_CHECKING:
     from weftform.comparison import Comparison
@@ -100,8 +100,8 @@ def compare(
         scale=scale,
         register_by="none" if no_registration else None if register_by is None else register_by.value,
         signed_angles=signed,
-        tolerances=_pairs(tolerance, "--tolerance", "outline=2"),
-        readings=_readings(_pairs(column, "--column", "outline.x=HEADER"), _pairs(unit, "--unit", "x=cm"), zero),
+        tolerances=pairs_of(tolerance, "--tolerance", "outline=2"),
+        readings=_readings(pairs_of(column, "--column", "outline.x=HEADER"), pairs_of(unit, "--unit", "x=cm"), zero),
     )
     written = found.write(out, figures=not no_figures)
     if as_json:
@@ -114,20 +114,6 @@ def compare(
         typer.secho(f"note       {warning}", err=True)
     if found.ok is False:
         raise typer.Exit(1)
-
-
-def _pairs(texts: list[str] | None, option: str, example: str) -> dict[str, str]:
-    from weftform.errors import MeasurementError
-
-    pairs: dict[str, str] = {}
-    for text in texts or ():
-        key, equals, value = (part.strip() for part in text.partition("="))
-        if not (equals and key and value):
-            raise MeasurementError("not of the form NAME=VALUE", key=option, expected=f"{option} {example}", got=text)
-        if key in pairs:
-            raise MeasurementError(f"{key} is given twice", key=option, expected="once", got=f"{pairs[key]}, {value}")
-        pairs[key] = value
-    return pairs
 
 
 def _readings(columns: dict[str, str], units: dict[str, str], zero: bool) -> dict[str, Reading]:

@@ -14,6 +14,7 @@ from weftform.errors import MeasurementError, ResultError
 from weftform.laboratory.averaging import MeanCurve, average
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
+from weftform.result.loading import loading_curve
 
 if TYPE_CHECKING:
     from weftform.result import Result
@@ -145,19 +146,14 @@ def _loading(result: Result) -> tuple[Floats, Floats, list[str]]:
             expected="columns displacement_mm and force_N",
             got=", ".join(history)[:200],
         )
-    way, force = history["displacement_mm"], history["force_N"]
-    finite = np.isfinite(way) & np.isfinite(force)
-    way, force = way[finite], force[finite]
-    notes = []
-    top = int(way.argmax()) if way.size else 0
-    if way.size and np.ptp(way[top:]) > 0.01 * np.ptp(way):
-        notes.append(f"the simulated curve is taken to its first largest displacement, {way[top]:.4g} mm")
-    way, force = way[: top + 1], force[: top + 1]
-    # a press at rest, as while the holder closes: the last row of a displacement is its force
-    fresh = np.append(np.diff(np.maximum.accumulate(way)) > 0.0, True) if way.size else np.zeros(0, bool)
-    way, force = way[fresh], force[fresh]
+    whole = history["displacement_mm"]
+    way, force = loading_curve(whole, history["force_N"])
     if len(way) < 2:
         raise ResultError(
             "the history has no way along which forces can be compared", file=result.folder / "history.csv"
         )
+    notes = []
+    back = whole[int(np.nanargmax(whole)) :]
+    if np.nanmax(back) - np.nanmin(back) > 0.01 * (np.nanmax(whole) - np.nanmin(whole)):
+        notes.append(f"the simulated curve is taken to its first largest displacement, {way[-1]:.4g} mm")
     return way, force, notes

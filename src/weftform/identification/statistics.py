@@ -9,6 +9,7 @@ import numpy as np
 
 from weftform.fabric.laws import Floats
 from weftform.identification.fits import Parameter
+from weftform.laboratory.scatter import neighbour_correlation, student
 
 CONFIDENCE = 0.95
 HIGH_CORRELATION = 0.95
@@ -22,8 +23,6 @@ NEAR_BOUND = 1.0e-3
 SYSTEMATIC = 0.9
 SMALL_MISFIT = 2.0e-3
 """Neighbouring residuals correlated by more than the first, with a misfit above the second: the model is at fault."""
-MOST_CORRELATION = 0.99
-"""Largest correlation of neighbouring residuals that is believed; beyond it a curve would hold no information."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +93,11 @@ def uncertainty(
     parameters, values
         In the order of the columns.
     """
-    from scipy.stats import t
-
     size = jacobian.shape[1]
     names = [p.name for p in parameters]
     at_bound = np.array([_at_bound(p, v) for p, v in zip(parameters, values, strict=True)])
     free = ~at_bound
-    neighbours = [_neighbour_correlation(r) for r in residuals]
+    neighbours = [neighbour_correlation(r) for r in residuals]
     independent = np.array(
         [max(len(r) * (1.0 - c) / (1.0 + c), 0.5 * _runs(r)) for r, c in zip(residuals, neighbours, strict=True)]
     )
@@ -159,7 +156,7 @@ def uncertainty(
             f"the errors are systematic (neighbours correlated by {max(neighbours):.3f}): the model does not follow the "
             "curves, and the intervals are rough"
         )
-    quantile = float(t.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+    quantile = student(CONFIDENCE, freedom)
     lower, upper = _interval(parameters, values, quantile * errors)
     for k, name in enumerate(names):
         if np.isfinite(errors[k]) and abs(values[k]) > 0.0 and upper[k] - lower[k] > 2.0 * abs(values[k]):
@@ -182,12 +179,6 @@ def uncertainty(
 def _at_bound(parameter: Parameter, value: float) -> bool:
     low, here, high = (parameter.normalised(v) for v in (parameter.lower, value, parameter.upper))
     return min(here - low, high - here) < NEAR_BOUND * (high - low)
-
-
-def _neighbour_correlation(residuals: Floats) -> float:
-    """Correlation of neighbouring residuals of a curve about zero; nought where it is negative."""
-    squares = float(0.5 * (residuals[1:] @ residuals[1:] + residuals[:-1] @ residuals[:-1]))
-    return min(max(float(residuals[1:] @ residuals[:-1]) / squares, 0.0), MOST_CORRELATION) if squares > 0.0 else 0.0
 
 
 def _runs(residuals: Floats) -> int:

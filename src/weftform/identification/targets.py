@@ -13,11 +13,11 @@ from weftform.errors import IdentificationError, MeasurementError
 from weftform.fabric.laws import Floats
 from weftform.identification.loading import travel
 from weftform.laboratory.fitting import RELATIVE_FLOOR
-from weftform.laboratory.kinematics import kinematic_angle, kinematic_limit
 from weftform.laboratory.markers import MarkerTracking
+from weftform.laboratory.measured_angle import measured_angles, slip_in_bias
 from weftform.laboratory.presets import Quantity
-from weftform.laboratory.slip import slip_onset
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
+from weftform.result.loading import loading_curve
 from weftform.study.schema import BiasModel
 from weftform.study.study import Study
 
@@ -100,8 +100,7 @@ def interpolated(displacement: Floats, force: Floats, at: Floats) -> Floats:
     """Force of a simulated curve [N] at displacements [mm], by monotone cubics between its rows."""
     from scipy.interpolate import PchipInterpolator
 
-    forward = np.append(True, displacement[1:] > np.maximum.accumulate(displacement)[:-1])
-    return np.asarray(PchipInterpolator(displacement[forward], force[forward], extrapolate=False)(at))
+    return np.asarray(PchipInterpolator(*loading_curve(displacement, force), extrapolate=False)(at))
 
 
 def read_target(
@@ -190,10 +189,8 @@ def _size_of_errors(force: Floats, weighting: Weighting, specimen: Specimen) -> 
 def _slip(s: Specimen, model: BiasModel, tracking: Sequence[MarkerTracking]) -> tuple[float | None, str]:
     """Onset of slip [mm] of a specimen, from the markers or its own column of angles, and a sentence about it."""
     height, width = model.specimen.length_mm, model.specimen.width_mm
-    pairs = [(t.displacement, t.zone("B").mean) for t in tracking]
-    if not pairs and s.angle is not None:
-        pairs = [(s.x, s.angle)]
-    if not pairs:
+    measured = measured_angles([s], tracking)
+    if measured is None:
         raise IdentificationError(
             f"{s.name}: no measured shear angle, so slip cannot be seen",
             file=s.file,
@@ -201,10 +198,7 @@ def _slip(s: Specimen, model: BiasModel, tracking: Sequence[MarkerTracking]) -> 
             expected="a column shear_angle_deg, or --markers and --layout",
             hint="give the end yourself: --range 0..16",
         )
-    d, angle = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    usable = d < kinematic_limit(height, width)
-    d, angle = d[usable], angle[usable]
-    found = slip_onset(d, angle, np.degrees(kinematic_angle(d, height, width)))
+    found = slip_in_bias(*measured, height, width)
     if found.displacement is None:
         return None, f"{s.name}: no slip found, the whole curve counts"
     return found.displacement, f"{s.name}: yarns slip from {found.displacement:.4g} mm on; the curve counts up to there"

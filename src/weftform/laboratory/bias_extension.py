@@ -21,11 +21,11 @@ from weftform.laboratory.kinematics import (
     kinematic_limit,
 )
 from weftform.laboratory.markers import MarkerTracking
-from weftform.laboratory.measured_angle import MeasuredAngle
+from weftform.laboratory.measured_angle import MeasuredAngle, measured_angles, slip_in_bias
 from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.shear import ShearCurve
-from weftform.laboratory.slip import SlipOnset, slip_onset
+from weftform.laboratory.slip import SlipOnset
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
 from weftform.laboratory.stages import LockingCriterion, shear_stages
 from weftform.laboratory.tabulating import TableFit, fit_table
@@ -164,11 +164,8 @@ def characterise_bias_extension(
     warnings = [w for s in specimens for w in s.warnings] + [w for t in tracking for w in t.warnings]
     _check_travel(specimens, height, width)
     mean = average(specimens)
-    measured = _measured(specimens, tracking)
-    slip = None
-    if measured is not None:
-        d, g = (v[measured[0] < kinematic_limit(height, width)] for v in measured)
-        slip = slip_onset(d, g, np.degrees(kinematic_angle(d, height, width)))
+    measured = measured_angles(specimens, tracking)
+    slip = None if measured is None else slip_in_bias(*measured, height, width)
     source: Literal["kinematic", "measured"]
     if angle == "auto":
         source = "measured" if slip is not None and slip.found else "kinematic"
@@ -311,21 +308,6 @@ def _check_travel(specimens: Sequence[Specimen], height: float, width: float) ->
                 got=f"{s.x[-1]:.6g} mm",
                 hint="is the displacement in metres or in inches? --unit displacement=m",
             )
-
-
-def _measured(specimens: Sequence[Specimen], tracking: Sequence[MarkerTracking]) -> tuple[Floats, Floats] | None:
-    """All measured angles of zone B: marker trackings, else the angle column of the specimens."""
-    pairs = [(t.displacement, t.zone("B").mean) for t in tracking]
-    if not pairs:
-        pairs = [(s.x, s.angle) for s in specimens if s.angle is not None]
-    if not pairs:
-        return None
-    displacement, angle = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    ok = np.isfinite(angle)
-    if ok.sum() < 2:
-        return None
-    order = np.argsort(displacement[ok], kind="stable")
-    return displacement[ok][order], angle[ok][order]
 
 
 def _end_of_interval(

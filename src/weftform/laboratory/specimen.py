@@ -11,6 +11,7 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats
 from weftform.laboratory.presets import Quantity
+from weftform.laboratory.scatter import neighbour_misses
 from weftform.laboratory.table import MeasuredTable, read_table
 
 FEWEST_POINTS = 8
@@ -310,8 +311,7 @@ def _without_spikes(s: Specimen, y_name: str) -> Specimen:
     """
     middle = np.median(np.lib.stride_tricks.sliding_window_view(s.y, 5), axis=1)
     departure = np.append(np.insert(np.abs(s.y[2:-2] - middle), 0, [0.0, 0.0]), [0.0, 0.0])
-    before = (s.x[2:] - s.x[1:-1]) / (s.x[2:] - s.x[:-2])
-    miss = np.pad(np.abs(before * s.y[:-2] + (1.0 - before) * s.y[2:] - s.y[1:-1]), 1)
+    miss = np.pad(np.abs(neighbour_misses(s.x, s.y)[0]), 1)
     noise = 1.4826 * float(np.median(miss[1:-1]))
     local = np.pad(np.abs(middle), 2, constant_values=np.inf)
     least = np.minimum(SPIKE_OF_FORCE * float(np.abs(middle).max()), SPIKE_OF_VALUE * local)

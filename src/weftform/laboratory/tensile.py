@@ -17,6 +17,7 @@ from weftform.laboratory.averaging import MeanCurve, average
 from weftform.laboratory.fitting import Band, PolynomialFit, Weighting, fit_polynomial
 from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
+from weftform.laboratory.scatter import point_scatter
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
 from weftform.laboratory.stages import TensileStages, tensile_stages
 from weftform.laboratory.tabulating import TableFit, fit_table
@@ -173,8 +174,7 @@ def characterise_tensile(
             )
     warnings = [w for s in specimens for w in s.warnings]
     mean = average(specimens)
-    noise = float(np.std(np.diff(mean.mean, 2)) / np.sqrt(6.0)) if len(mean.mean) > 4 else 0.0
-    stages = tensile_stages(mean.x, mean.mean, noise)
+    stages = tensile_stages(mean.x, mean.mean, point_scatter(mean.x, mean.mean))
     start, end = interval if interval is not None else (0.0, stages.linear_end)
     if not 0.0 <= start < end:
         raise MeasurementError("the interval is empty", expected="0 <= start < end", got=f"{start:g} to {end:g} mm")

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from weftform.laboratory import Quantity, Reading, characterise_picture_frame, read_table, sample
 from weftform.laboratory.card_file import provenance, write_card
 from weftform.laboratory.kinematics import bias_design, kinematic_displacement
+from weftform.laboratory.scatter import point_scatter
 from weftform.laboratory.specimen import Specimen, read_specimens
 from weftform.reproduction.items import Item
+from weftform.reproduction.simulated import value_at
 from weftform.result import Result
 
 Floats = NDArray[np.float64]
@@ -57,28 +59,6 @@ def frame_tables() -> tuple[FrameTable, ...]:
     names = np.array(table.names[Quantity.SPECIMEN])
     angle, force = (table.values[q] for q in columns)
     return tuple(FrameTable(str(n), angle[names == n], force[names == n]) for n in dict.fromkeys(names))
-
-
-def point_scatter(x: Floats, y: Floats) -> float:
-    """Standard deviation of points about an unknown smooth curve, from each point and its two neighbours.
-
-    A point misses the straight line between its neighbours by its own error and theirs; the curve itself adds only
-    its curvature between neighbours. No law is fitted, so a law can be judged by it.
-
-    Parameters
-    ----------
-    x, y
-        Increasing places and values, shape [n], n > 2.
-
-    References
-    ----------
-    Gasser, Sroka, Jennen-Steinmetz (1986), Residual variance and residual pattern in nonlinear regression, Biometrika
-    73:625-633.
-    """
-    before = (x[2:] - x[1:-1]) / (x[2:] - x[:-2])
-    after = 1.0 - before
-    miss = before * y[:-2] + after * y[2:] - y[1:-1]
-    return float(np.sqrt(np.mean(miss**2 / (before**2 + after**2 + 1.0))))
 
 
 def write_cards(folder: Path) -> dict[str, Path]:
@@ -219,8 +199,7 @@ def real_frame_items(results: Mapping[str, Result]) -> list[Item]:
 
 
 def _force_at(result: Result, height: float, width: float, angle: float) -> float:
-    d = float(kinematic_displacement(angle, height, width))
-    return float(np.interp(d, result.history["displacement_mm"], result.history["force_N"]))
+    return value_at(result, float(kinematic_displacement(angle, height, width)))
 
 
 def _zones(result: Result, height: float, width: float, angle: float) -> float:
