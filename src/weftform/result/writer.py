@@ -54,8 +54,10 @@ def claim_folder(folder: Path, *, resume: bool = False) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name in OURS:
             (folder / name).unlink(missing_ok=True)
-        for figure in (folder / "figures").glob("*.png"):
-            figure.unlink()
+        (folder / "comparison" / "comparison.json").unlink(missing_ok=True)
+        for drawn in ("figures", "comparison"):
+            for figure in (folder / drawn).glob("*.png"):
+                figure.unlink()
         probe = folder / ".writable"
         probe.touch()
         probe.unlink()
