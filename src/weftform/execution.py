@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from weftform.cases import Case, case_of
-from weftform.errors import ResultError, StudyError, UnstableRun
+from weftform.errors import DeviceError, ResultError, StudyError, UnstableRun
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
@@ -70,6 +70,25 @@ class Progress:
 
 Watch = Callable[[Progress], None]
 
+Device = Literal["cpu", "cuda"]
+"""Where the time loop runs: this machine's processors, or a GPU."""
+
+
+def check_device(device: str) -> None:
+    """Make sure that a device can be used, before anything is written.
+
+    Raises
+    ------
+    DeviceError
+        There is no such device, or none on this machine.
+    """
+    if device not in get_args(Device):
+        raise DeviceError("no such device", key="--device", expected="cpu or cuda", got=device)
+    if device == "cuda":
+        from weftform.solver.cuda.gpu import find_gpu
+
+        find_gpu()
+
 
 def threads_for(cells: int, wanted: int | None) -> int:
     """Threads to use: those asked for, or as many as pay for the size of the blank.
@@ -101,6 +120,7 @@ def run(
     out: str | Path,
     *,
     threads: int | None = None,
+    device: Device = "cpu",
     resume: bool = False,
     watch: Watch | None = None,
 ) -> Result:
@@ -114,6 +134,8 @@ def run(
         Result folder; created, or cleared of a former result.
     threads
         Bands of rows computed in parallel; chosen by the size of the blank without. The result does not depend on it.
+    device
+        ``cpu``, or ``cuda`` for a GPU (needs ``weftform[cuda]``); threads count on the processor only.
     resume
         Go on from the checkpoint of an interrupted run in ``out``.
     watch
@@ -125,7 +147,7 @@ def run(
 
     Raises
     ------
-    StudyError, CardError, ResultError
+    StudyError, CardError, ResultError, DeviceError
         Nothing was written.
     UnstableRun
         The run blew up; the result folder holds all that was computed before.
@@ -135,16 +157,19 @@ def run(
     if not isinstance(study, Study):
         study = Study.load(study)
     out = Path(out)
+    check_device(device)
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
-    Run(case_of(study), out, threads, watch, resume).go()
+    Run(case_of(study), out, threads, watch, resume, device).go()
     return Result.open(out)
 
 
 class Run:
     """One run of a case."""
 
-    def __init__(self, case: Case, out: Path, threads: int, watch: Watch | None, resume: bool) -> None:
+    def __init__(
+        self, case: Case, out: Path, threads: int, watch: Watch | None, resume: bool, device: Device = "cpu"
+    ) -> None:
         self.case = case
         self.study = case.study
         self.out = out
@@ -153,7 +178,7 @@ class Run:
         self.columns = [*COLUMNS, *case.columns]
         if watch is not None:
             watch(Progress(0.0, 0.0, 0, 0.0, math.nan, compiling=True))
-        self.simulation = Simulation(case.problem(), threads)
+        self.simulation = Simulation(case.problem(), threads, device)
         self.rows: list[dict[str, float]] = []
         self._last_sound = self._fields()
         self.peak_penetration = 0.0
@@ -312,6 +337,7 @@ class Run:
             "wall_s": self.wall,
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
+            "device": simulation.device,
             "energy": energy,
             "shear_angle_deg": fields.shear_statistics(),
             "penetration_mm": self.peak_penetration,
@@ -419,4 +445,4 @@ def _versions() -> str:
     )
 
 
-__all__ = ["Progress", "Run", "run", "threads_for"]
+__all__ = ["Device", "Progress", "Run", "check_device", "run", "threads_for"]

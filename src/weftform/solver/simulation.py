@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ from weftform.solver import layout as at
 from weftform.solver.layout import Layout, stride_for
 from weftform.solver.spans import row_spans
 from weftform.tooling import RigidTool
+
+if TYPE_CHECKING:
+    from weftform.solver.cuda.driver import CudaDriver
 
 Floats = NDArray[np.float64]
 
@@ -138,13 +142,22 @@ class Simulation:
         What to simulate.
     threads
         Bands of rows computed in parallel; the result does not depend on it.
+    device
+        Where the steps are computed: ``cpu``, or ``cuda`` for a GPU (:mod:`weftform.solver.cuda`).
+
+    Raises
+    ------
+    DeviceError
+        A GPU was asked for and there is none that can be used.
     """
 
-    def __init__(self, problem: Problem, threads: int = 1) -> None:
+    def __init__(self, problem: Problem, threads: int = 1, device: Literal["cpu", "cuda"] = "cpu") -> None:
         grid, fabric = problem.grid, problem.fabric
         self.problem = problem
+        self.device = device
+        self._driver: CudaDriver | None = None
         self.rows, self.columns = grid.shape
-        self.bands = max(1, min(threads, self.rows // 4))
+        self.bands = max(1, min(threads, self.rows // 4)) if device == "cpu" else 1
         self.density = fabric.areal_density * problem.settings.mass_scaling
         warp = pack_law(fabric.warp.line_law(grid.weft_pitch), 1.5)
         weft = pack_law(fabric.weft.line_law(grid.warp_pitch), 1.5)
@@ -191,6 +204,8 @@ class Simulation:
         self._fill_state()
         self._place_tools()
         self._drive_crossings()
+        if device == "cuda":
+            self._driver = self._start_driver()
         self.clock = np.zeros(loop.CLOCK_COLUMNS)
         self.clock[loop.C_INERTIA] = 1.0
         self.largest_inertia = 1.0
@@ -229,7 +244,7 @@ class Simulation:
     def _fill_state(self) -> None:
         grid, fabric, layout = self.problem.grid, self.problem.fabric, self.layout
         rows, columns = self.rows, self.columns
-        self._state = np.zeros((self._local_rows, layout.fields, layout.stride))
+        self._host_state = np.zeros((self._local_rows, layout.fields, layout.stride))
         fields = np.zeros((rows, layout.fields, layout.stride))
         # Padding and crossings outside the blank keep the flat grid's distances, so that no vector loop divides by
         # zero, and lie where no crossing of the blank can run into them.
@@ -354,6 +369,45 @@ class Simulation:
         self._mode_motion = np.asarray(driven.motions, np.int64)
         self._mode_kind = np.asarray(driven.kinds, np.int64)
 
+    def _start_driver(self) -> CudaDriver:
+        """Hand the state over to a GPU."""
+        from weftform.solver.cuda.driver import CudaDriver
+        from weftform.solver.cuda.sweep import Constants
+
+        settings, layout = self.problem.settings, self.layout
+        warp, weft, shear = (
+            (coefficients, packed.degree, packed.pieces, *(float(v) for v in ends))
+            for coefficients, packed, ends in zip(self._loop_laws, self._packed, self._loop_ends, strict=True)
+        )
+        constants = Constants(
+            warp_law=warp,
+            weft_law=weft,
+            shear_law=shear,
+            series=self._loop_series,
+            membrane=tuple(self._membrane.tolist()),
+            columns=self.columns,
+            rows=self.rows,
+            modes=len(self._mode_motion),
+        )
+        return CudaDriver(
+            layout,
+            constants,
+            (self._laws[0][1], self._laws[1][1]),
+            self._host_state,
+            (self._motion_times, self._motion_values, self._motion_knots, settings.ramp),
+            (self._driven_nodes, self._driven_held, self._driven_modes, self._mode_motion, self._mode_kind),
+            viscosity=settings.viscosity * self.problem.grid.cell_area,
+            damping=settings.damping,
+            density=self.density,
+        )
+
+    @property
+    def _state(self) -> Floats:
+        """State on the host, shape [local rows, fields, stride]; where a GPU computes, brought up to date."""
+        if self._driver is not None:
+            self._driver.fetch(self._host_state)
+        return self._host_state
+
     def _choose_step(self) -> None:
         s, grid, membrane = self.last, self.problem.grid, self._membrane
         warp, weft, shear = self._packed
@@ -386,6 +440,8 @@ class Simulation:
 
     def _kinetic_energy(self) -> float:
         """Kinetic energy of the fabric [mJ]."""
+        if self._driver is not None:
+            return self._driver.kinetic_energy(self.density * float(self.clock[loop.C_INERTIA]))
         speeds = np.einsum("jik,jik->ji", self.velocities, self.velocities)
         inertia = self._state[self._row_index, at.INERTIA, : self.columns]
         return 0.5 * self.density * float(self.clock[loop.C_INERTIA]) * float((inertia * speeds).sum())
@@ -440,6 +496,8 @@ class Simulation:
 
     def _advance(self, steps: int, stop: float) -> int:
         settings = self.problem.settings
+        if self._driver is not None:
+            return self._driver.advance(self.clock, steps, stop, self._tool_table, self._poses, self._driven_state)
         if self.bands > 1:
             import numba
 
@@ -460,16 +518,20 @@ class Simulation:
 
     def _survey(self) -> Floats:
         layout, grid = self.layout, self.problem.grid
+        reach, margin = SURVEY_EVERY * self.clock[loop.C_STEP], CONTACT_MARGIN * self.problem.fabric.thickness
+        if self._driver is not None:
+            return self._driver.survey(self._tool_table, self._poses, reach, SURVEY_EVERY, margin)
         found: Floats = survey.survey(
             self._state.reshape(-1), self._row_index, self.columns, layout.stride, layout.fields,
             layout.half_cells, layout.edge_weight, layout.tools, grid.warp_pitch, grid.weft_pitch,
-            self._tool_table, self._poses, self._touching, SURVEY_EVERY * self.clock[loop.C_STEP], SURVEY_EVERY,
-            CONTACT_MARGIN * self.problem.fabric.thickness,
+            self._tool_table, self._poses, self._touching, reach, SURVEY_EVERY, margin,
         )  # fmt: skip
         return found
 
     def _enter_ledger(self) -> Floats:
         layout, grid = self.layout, self.problem.grid
+        if self._driver is not None:
+            return self._driver.enter_ledger(self._tool_table, self._poses, self.density)
         entry: Floats = energies.enter_ledger(
             self._state.reshape(-1), self._row_index, self.columns, layout.stride, layout.fields,
             layout.half_cells, layout.edge_weight, layout.tool, layout.tools, self.density,
@@ -492,6 +554,9 @@ class Simulation:
 
     def compile(self) -> None:
         """Compile the time loop, or load it from the cache, by calling it for no step."""
+        if self._driver is not None:
+            self._driver.compile(self._tool_table, self._poses, self._driven_state)
+            return
         clock = self.clock.copy()
         self._advance(0, 0.0)
         self.clock[:] = clock
@@ -523,6 +588,7 @@ class Simulation:
         self._state[self._row_index] = fields
         if self._halo_to.size:
             self._state[self._halo_to] = fields[self._halo_row]
+        self._state_changed()
         self._poses[:] = saved["poses"]
         self.clock[:] = saved["clock"]
         self._driven_state[:] = saved["driven"]
@@ -549,8 +615,15 @@ class Simulation:
         """Steps made."""
         return int(self.clock[loop.C_STEPS_DONE])
 
+    def _state_changed(self) -> None:
+        """The host has changed the state."""
+        if self._driver is not None:
+            self._driver.send(self._host_state)
+
     def _grid_field(self, first: int) -> Floats:
-        rows = self._state[self._row_index]
+        if self._driver is not None:
+            self._driver.fetch_moving(self._host_state)
+        rows = self._host_state[self._row_index]
         return np.ascontiguousarray(rows[:, first : first + 3, : self.columns].transpose(0, 2, 1))
 
     @property
@@ -568,6 +641,7 @@ class Simulation:
     def velocities(self, values: Floats) -> None:
         for c in range(3):
             self._state[self._row_index, at.VELOCITY + c, : self.columns] = values[..., c]
+        self._state_changed()
 
     @property
     def masses(self) -> Floats:
