@@ -1,6 +1,6 @@
 """Small problems on both devices. As a program: run one on the CUDA simulator and keep what it computed.
 
-NUMBA_ENABLE_CUDASIM=1 python cuda_cases.py CASE STEPS FILE
+NUMBA_ENABLE_CUDASIM=1 python cuda_cases.py CASE STEPS THREADS FILE
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from small_problems import (
     FABRIC,
     STILL,
     affine,
-    all_nodes,
     ball,
     bias_grid,
     edge_nodes,
@@ -23,7 +22,7 @@ from small_problems import (
 )
 
 from weftform.fabric import Fabric
-from weftform.solver import Driven, Motion, Problem, Settings, Simulation, loop
+from weftform.solver import Driven, Motion, Problem, Settings, Simulation, loop, survey
 
 TABULATED = Fabric.load(
     "hexforce-48600-c1300",
@@ -98,7 +97,9 @@ def compute(case, steps, device):
         "contact forces": simulation.contact_forces[grid.active],
         "driven forces": simulation.driven_forces,
         "tools": saved["poses"],
-        "survey": simulation.last,
+        "strains": simulation.last[[survey.WARP_STRAIN, survey.WEFT_STRAIN, survey.HALF_TANGENT, survey.SLACKEST]],
+        "penetration": simulation.last[survey.PENETRATION],
+        "fastest": simulation.last[survey.FASTEST],
         "energies": np.array(dataclasses.astuple(simulation.ledger())),
     }
 
@@ -106,4 +107,7 @@ def compute(case, steps, device):
 if __name__ == "__main__":
     # the simulator polls the threads of a block; with the usual interval it mostly waits for its turn
     sys.setswitchinterval(1e-5)
-    np.savez(sys.argv[3], **compute(sys.argv[1], int(sys.argv[2]), "cuda"))
+    from weftform.solver.cuda import driver
+
+    driver.SIMULATOR_TILE = dataclasses.replace(driver.SIMULATOR_TILE, threads=int(sys.argv[3]))
+    np.savez(sys.argv[4], **compute(sys.argv[1], int(sys.argv[2]), "cuda"))

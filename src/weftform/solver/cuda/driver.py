@@ -45,6 +45,8 @@ MOVING = at.INVERSE_MASS
 """Fields that a step changes for every crossing: position and velocity, kept twice."""
 LOOKING_THREADS = 128
 """Threads of a block that looks at a row."""
+SIMULATOR_TILE = Tile(6, 3, 1)
+"""Under the simulator, which starts an operating-system thread for every thread of a block."""
 
 
 class CudaDriver:
@@ -107,9 +109,8 @@ class CudaDriver:
             # a warning of numba-cuda about small launches means nothing to a test
             warnings.simplefilter("ignore", getattr(numba.core.errors, "NumbaPerformanceWarning", Warning))
         sums = layout.tools + layout.driven
-        # the simulator starts an operating-system thread for every thread of a block
-        self.tile = tile or (Tile(5, 4, 1) if SIMULATED else tile_for(sums))
-        self._look_threads = 1 if SIMULATED else LOOKING_THREADS
+        self.tile = tile or (SIMULATOR_TILE if SIMULATED else tile_for(sums))
+        self._look_threads = SIMULATOR_TILE.threads if SIMULATED else LOOKING_THREADS
         self._blocks = self.tile.grid(self.rows, self.columns)
         self._shared = self.tile.shared_bytes(sums)
         self._sweep = compile_sweep(layout, constants, self.tile)
