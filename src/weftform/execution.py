@@ -74,17 +74,21 @@ Device = Literal["cpu", "cuda"]
 """Where the time loop runs: this machine's processors, or a GPU."""
 
 
-def check_device(device: str) -> None:
+def check_device(device: str, threads: int | None = None) -> None:
     """Make sure that a device can be used, before anything is written.
 
     Raises
     ------
     DeviceError
-        There is no such device, or none on this machine.
+        There is no such device, none on this machine, or threads are asked of a GPU.
     """
     if device not in get_args(Device):
         raise DeviceError("no such device", key="--device", expected="cpu or cuda", got=device)
     if device == "cuda":
+        if threads is not None:
+            raise DeviceError(
+                "threads are of the processor", key="--threads", expected="none with --device cuda", got=str(threads)
+            )
         from weftform.solver.cuda.gpu import find_gpu
 
         find_gpu()
@@ -157,7 +161,7 @@ def run(
     if not isinstance(study, Study):
         study = Study.load(study)
     out = Path(out)
-    check_device(device)
+    check_device(device, threads)
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
     Run(case_of(study), out, threads, watch, resume, device).go()
@@ -338,6 +342,7 @@ class Run:
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
             "device": simulation.device,
+            "device_name": simulation.device_name,
             "energy": energy,
             "shear_angle_deg": fields.shear_statistics(),
             "penetration_mm": self.peak_penetration,

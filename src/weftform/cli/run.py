@@ -91,7 +91,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
 
 def _computed_on(summary: dict[str, Any]) -> str:
     if summary["device"] == "cuda":
-        return "on the GPU"
+        return f"on {summary['device_name']}"
     return f"{summary['threads']} thread{'s' if summary['threads'] > 1 else ''}"
 
 

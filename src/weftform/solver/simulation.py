@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import platform
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -599,6 +600,11 @@ class Simulation:
         self.last = self._survey()
 
     # -- looking ---------------------------------------------------------------------------------------------------
+
+    @property
+    def device_name(self) -> str:
+        """What computes the steps: the processor's architecture, or the GPU."""
+        return platform.machine() if self._driver is None else self._driver.gpu.name
 
     @property
     def time(self) -> float:

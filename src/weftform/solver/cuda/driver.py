@@ -7,10 +7,8 @@ batch of steps; positions and fields come back only when they are asked for.
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any
 
-import numba
 import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
@@ -20,8 +18,9 @@ from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, survey
 from weftform.solver import layout as at
 from weftform.solver.cuda import looking
-from weftform.solver.cuda.functions import SIMULATED
+from weftform.solver.cuda.functions import SIMULATED, python_function
 from weftform.solver.cuda.gpu import find_gpu
+from weftform.solver.cuda.interrupts import uninterrupted
 from weftform.solver.cuda.sweep import COMPILE_ONLY, S_TOOLS, Constants, Tile, compile_sweep, start_driven, tile_for
 from weftform.solver.layout import Layout
 from weftform.solver.loop import (
@@ -41,6 +40,8 @@ from weftform.solver.loop import (
 
 Floats = NDArray[np.float64]
 
+value_of_motion = python_function(motion_value)
+"""Called a few times per step from Python, where calling a compiled function gains nothing over its compilation."""
 MOVING = at.INVERSE_MASS
 """Fields that a step changes for every crossing: position and velocity, kept twice."""
 LOOKING_THREADS = 128
@@ -105,9 +106,6 @@ class CudaDriver:
                 got=f"{self.gpu.memory / 2**20:.0f} MiB",
                 hint="take longer cells (blank.cell_length_mm), or run with --device cpu",
             )
-        if SIMULATED:
-            # a warning of numba-cuda about small launches means nothing to a test
-            warnings.simplefilter("ignore", getattr(numba.core.errors, "NumbaPerformanceWarning", Warning))
         sums = layout.tools + layout.driven
         self.tile = tile or (SIMULATOR_TILE if SIMULATED else tile_for(sums))
         self._look_threads = SIMULATOR_TILE.threads if SIMULATED else LOOKING_THREADS
@@ -165,6 +163,12 @@ class CudaDriver:
 
         ``clock``, ``poses`` and ``driven_state`` are brought up to date, as by the time loop of the processor.
         """
+        with uninterrupted():
+            return self._advance(clock, steps, stop, tools, poses, driven_state)
+
+    def _advance(
+        self, clock: Floats, steps: int, stop: float, tools: Floats, poses: Floats, driven_state: Floats
+    ) -> int:
         plan = self._schedule(clock, steps, stop, tools, poses)
         made = len(plan) - 1
         if made == 0:
@@ -218,12 +222,12 @@ class CudaDriver:
                 motion = int(tool[T_MOTION])
                 at_time = time if tool[T_MASS] > 0.0 else time + step
                 row.append(
-                    motion_value(times[motion], values[motion], knots[motion], ramp, at_time)
+                    value_of_motion(times[motion], values[motion], knots[motion], ramp, at_time)
                     if motion >= 0
                     else float(poses[k, P_Z])
                 )
             for motion, kind in zip(self._mode_motion, self._mode_kind, strict=True):
-                value = motion_value(times[motion], values[motion], knots[motion], ramp, time + step)
+                value = value_of_motion(times[motion], values[motion], knots[motion], ramp, time + step)
                 row.append(math.cos(value) - 1.0 if kind == COSINE else math.sin(value) if kind == SINE else value)
             rows.append(row)
             clock[C_TIME] = time + step

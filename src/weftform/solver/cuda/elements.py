@@ -37,9 +37,10 @@ def connector_pull(way, rate, weight, inverse_length, viscosity, law):
     """
     length = math.sqrt(dot(way, way))
     pull = connector_force(law[0], law[1], law[2], law[3], law[4], law[5], length * inverse_length - 1.0)
-    stretching = dot(way, rate) / length
+    inverse = 1.0 / length
+    stretching = dot(way, rate) * inverse
     drag = viscosity * stretching
-    f = weight * (pull + drag) / length
+    f = weight * (pull + drag) * inverse
     return (f * way[0], f * way[1], f * way[2]), weight * drag * stretching
 
 

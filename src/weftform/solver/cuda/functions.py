@@ -8,6 +8,7 @@ compiled again, together with the functions that it calls. Under the simulator i
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from types import FunctionType
 from typing import Any
 
@@ -15,27 +16,33 @@ import numba
 from numba import cuda
 from numba.core.dispatcher import Dispatcher
 
+# a small blank does not fill a GPU; the user has asked for it all the same
+numba.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # type: ignore[attr-defined]
+
 SIMULATED = bool(numba.config.ENABLE_CUDASIM)  # type: ignore[attr-defined]
 
-_made: dict[Any, Any] = {}
+
+@cache
+def python_function(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A compiled function, and every compiled function that it calls, as they were written."""
+    return _rebuilt(getattr(function, "py_func", function), python_function)
 
 
+@cache
 def device_function(function: Callable[..., Any]) -> Any:
     """Compile a function of numbers and tuples for the device, and every scalar function that it calls."""
-    source = getattr(function, "py_func", function)
-    if source not in _made:
-        called = {name: source.__globals__[name] for name in source.__code__.co_names if name in source.__globals__}
-        replaced = {name: device_function(value) for name, value in called.items() if isinstance(value, Dispatcher)}
-        plain = FunctionType(
-            source.__code__,
-            {**source.__globals__, **replaced},
-            source.__name__,
-            source.__defaults__,
-            source.__closure__,
-        )
-        jit: Any = cuda.jit
-        _made[source] = plain if SIMULATED else jit(device=True, forceinline=True)(plain)
-    return _made[source]
+    if SIMULATED:
+        return python_function(function)
+    jit: Any = cuda.jit
+    return jit(device=True, forceinline=True)(_rebuilt(getattr(function, "py_func", function), device_function))
+
+
+def _rebuilt(source: Any, convert: Callable[..., Any]) -> Callable[..., Any]:
+    """A Python function whose compiled callees are converted."""
+    called = {name: source.__globals__[name] for name in source.__code__.co_names if name in source.__globals__}
+    replaced = {name: convert(value) for name, value in called.items() if isinstance(value, Dispatcher)}
+    scope = {**source.__globals__, **replaced}
+    return FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
 
 
 # -- vectors as tuples: values in registers ---------------------------------------------------------

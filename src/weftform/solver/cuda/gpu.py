@@ -59,7 +59,7 @@ def find_gpu() -> Gpu:
     except Exception as problem:
         raise _unusable(f"numba-cuda cannot be imported: {_first_line(problem)}") from None
     if _simulated():
-        return Gpu("simulator", (0, 0), 2**62, simulated=True)
+        return Gpu("CUDA simulator", (0, 0), 2**62, simulated=True)
     # what numba-cuda prints while it looks for a driver is in our message
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         return _probe(cuda)

@@ -22,7 +22,7 @@ from numba import cuda
 
 from weftform.solver import layout as at
 from weftform.solver.cuda.elements import cell_forces, connector_pull, tool_force
-from weftform.solver.cuda.functions import combine, device_function, minus, put_vector, vector_at
+from weftform.solver.cuda.functions import combine, device_function, dot, minus, put_vector, vector_at
 from weftform.solver.layout import Layout
 from weftform.solver.loop import (
     P_DAMPED,
@@ -249,7 +249,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         return minus(other, own)
 
     @device_function
-    def touch(fields, n, position, pace, force, table, poses, touching, row, schedule, s, shared, thread):
+    def touch(fields, n, position, pace, force, table, poses, touching, row, last_step, shared, thread):
         """Add the forces of the tools that the row can touch."""
         area = fields[n + area_field]
         for k in range(tools):
@@ -260,7 +260,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             before = vector_at(fields, field, stride)
             on, stick, heat = tool_force(
                 position, pace, before, area, table, k, poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z],
-                schedule[s, S_LAST_STEP], stand == ON_FACE,
+                last_step, stand == ON_FACE,
             )  # fmt: skip
             # most crossings of a row that can touch do not: nothing to store
             if stick[0] != before[0] or stick[1] != before[1] or stick[2] != before[2]:
@@ -272,7 +272,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         return force
 
     @device_function
-    def drive(fields, n, m, force, new, schedule, s, place, held, modes_of, state):
+    def drive(fields, n, m, force, new, step, schedule, s, place, held, modes_of, state):
         """Book the work on a driven crossing and give it the velocity of the next step; returns the work."""
         put_vector(fields, n + force_field, stride, force)
         work = 0.0
@@ -280,7 +280,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             if held[place, c] == 0:
                 continue
             at_c = m + np.uint64(c) * stride
-            way = new[at_c + velocity] * schedule[s, S_STEP]
+            way = new[at_c + velocity] * step
             work -= force[c] * 0.5 * (way + state[place, 3 + c])
             state[place, 3 + c] = way
             share = schedule[s + 1, S_SHARE]
@@ -299,6 +299,10 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             return
         shared = cuda.shared.array(0, numba.float64)
         thread = cuda.threadIdx.x
+        # read once: after the first store nothing tells the compiler that the schedule is still the same
+        step, last_step = schedule[s, S_STEP], schedule[s, S_LAST_STEP]
+        kick, keep = schedule[s, S_KICK], schedule[s, S_KEEP]
+        damping, viscosity = schedule[s, S_DAMPING], schedule[s, S_VISCOSITY]
         first_column = cuda.blockIdx.x * own_columns - 1
         first_row = cuda.blockIdx.y * own_rows - 1
         touched = 0
@@ -308,7 +312,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             if 0 <= i < columns and 0 <= j < rows:
                 m = np.uint64(j * moving_row + i)
                 n = np.uint64(j * fields_row + i)
-                compute_element(moving, fields, shared, element, m, n, schedule[s, S_VISCOSITY])
+                compute_element(moving, fields, shared, element, m, n, viscosity)
                 for k in range(tools):
                     if touching[k, j] != CLEAR:
                         touched = 1
@@ -335,29 +339,23 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             inner = gather(shared, element)
             force = inner
             if tools > 0:
-                force = touch(fields, n, position, pace, inner, table, poses, touching, j, schedule, s, shared, thread)
+                force = touch(fields, n, position, pace, inner, table, poses, touching, j, last_step, shared, thread)
             inverse = vector_at(fields, n + inverse_mass, stride)
-            kick = schedule[s, S_KICK]
-            keep = schedule[s, S_KEEP]
             after = (
                 keep * pace[0] + kick * inverse[0] * force[0],
                 keep * pace[1] + kick * inverse[1] * force[1],
                 keep * pace[2] + kick * inverse[2] * force[2],
             )
             put_vector(new, m + velocity, stride, after)
-            put_vector(new, m, stride, combine(1.0, position, schedule[s, S_STEP], after))
+            put_vector(new, m, stride, combine(1.0, position, step, after))
             twice = combine(1.0, pace, 1.0, after)
-            fields[n + damped_field] += (
-                schedule[s, S_DAMPING]
-                * fields[n + inertia_field]
-                * (twice[0] * twice[0] + twice[1] * twice[1] + twice[2] * twice[2])
-                + schedule[s, S_STEP] * shared[9 * size + element]
-            )
+            heat = step * shared[9 * size + element]
+            fields[n + damped_field] += damping * fields[n + inertia_field] * dot(twice, twice) + heat
             if driven:
                 place = driven_place[j, i]
                 if place >= 0:
                     shared[accumulators + tools * threads + thread] += drive(
-                        fields, n, m, inner, new, schedule, s, place, held, modes_of, state
+                        fields, n, m, inner, new, step, schedule, s, place, held, modes_of, state
                     )
 
         if sums == 0:
@@ -383,8 +381,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         add_up(shared, thread)
         if thread == 0:
             finished[0] = 0
-            step = schedule[s, S_STEP]
-            mean_step = 0.5 * (step + schedule[s, S_LAST_STEP])
+            mean_step = 0.5 * (step + last_step)
             for k in range(tools):
                 move_tool(
                     table, poses, k, shared[accumulators + k * threads], schedule[s, S_TOOLS + k], step, mean_step
