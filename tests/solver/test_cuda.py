@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,11 @@ STEPS = 200
 TOLERANCE = 1e-9
 """Rounding of one step is 1e-16; sums are taken in another order, and a yarn that goes slack or a crossing that starts to
 slide a rounding error earlier or later amplifies it for a few steps."""
+
+
+needs_simulator = pytest.mark.skipif(
+    find_spec("numba.cuda") is None, reason="needs numba-cuda, or a Numba that still holds its simulator"
+)
 
 
 def on_simulator(case, steps, threads, folder):
@@ -49,6 +55,7 @@ def agreeing(case, steps, threads, folder):
     return here
 
 
+@needs_simulator
 @pytest.mark.parametrize("case", [c if c == "tools" else pytest.param(c, marks=pytest.mark.slow) for c in CASES])
 def test_device_agrees_with_processor_after_200_steps(case, tmp_path):
     here = agreeing(case, STEPS, 1, tmp_path)
@@ -60,11 +67,13 @@ def test_device_agrees_with_processor_after_200_steps(case, tmp_path):
         assert min(kinetic, friction, damping) > 0.0
 
 
+@needs_simulator
 def test_threads_of_a_block_share_its_work(tmp_path):
     """Five threads on the 18 elements of a tile and on the nine crossings of a row: uneven shares, sums as a tree."""
     agreeing("tools", 20, 5, tmp_path)
 
 
+@needs_simulator
 @pytest.mark.slow
 def test_run_writes_the_same_result(tmp_path):
     """A whole run, output included, to the digits of history.csv."""

@@ -66,6 +66,8 @@ def find_gpu() -> Gpu:
 
 
 def _probe(cuda: Any) -> Gpu:
+    import numba
+
     try:
         if not cuda.is_available():
             raise _unusable("there is no NVIDIA GPU, or no driver for it")
@@ -73,13 +75,21 @@ def _probe(cuda: Any) -> Gpu:
         name = device.name.decode() if isinstance(device.name, bytes) else str(device.name)
         capability = (int(device.compute_capability[0]), int(device.compute_capability[1]))
         memory = int(cuda.current_context().get_memory_info()[0])
+        # what only a launch shows: a toolkit that is missing, or newer than the driver
+        numba.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # type: ignore[attr-defined]
+        cuda.jit(_nothing)[1, 1]()
+        cuda.synchronize()
     except DeviceError:
         raise
     except Exception as problem:
-        raise _unusable(f"the GPU does not answer: {_first_line(problem)}") from None
+        raise _unusable(f"the GPU runs no kernel: {_first_line(problem)}") from None
     if capability < LEAST_CAPABILITY:
         raise _unusable(f"{name} has compute capability {capability[0]}.{capability[1]}; 7.0 or later is needed")
     return Gpu(name, capability, memory)
+
+
+def _nothing() -> None:
+    """A kernel that does nothing."""
 
 
 def _simulated() -> bool:
