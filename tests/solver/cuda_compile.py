@@ -14,7 +14,7 @@ from cuda_cases import CASES
 from numba import cuda, types
 
 from weftform.solver import Simulation, energies, survey
-from weftform.solver.cuda import driver, looking, sweep
+from weftform.solver.cuda import driver, launch, looking, sweep
 
 HOPPER = (9, 0)
 LINE, TABLE = types.float64[::1], types.float64[:, ::1]
@@ -46,7 +46,7 @@ def check(name, kernel, *arguments):
 
 if __name__ == "__main__":
     layout, constants = constants_of(sys.argv[1])
-    tile = sweep.tile_for(layout.tools + layout.driven)
+    tile = launch.tile_for(layout.tools + layout.driven)
     device = mock.Mock(compute_capability=HOPPER)
     with mock.patch.object(numba.cuda.dispatcher, "get_current_device", lambda: device):
         try:

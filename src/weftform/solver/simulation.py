@@ -373,7 +373,7 @@ class Simulation:
     def _start_driver(self) -> CudaDriver:
         """Hand the state over to a GPU."""
         from weftform.solver.cuda.driver import CudaDriver
-        from weftform.solver.cuda.sweep import Constants
+        from weftform.solver.cuda.launch import Constants
 
         settings, layout = self.problem.settings, self.layout
         warp, weft, shear = (

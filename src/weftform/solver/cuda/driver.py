@@ -21,7 +21,8 @@ from weftform.solver.cuda import looking
 from weftform.solver.cuda.functions import SIMULATED, python_function
 from weftform.solver.cuda.gpu import find_gpu
 from weftform.solver.cuda.interrupts import uninterrupted
-from weftform.solver.cuda.sweep import COMPILE_ONLY, S_TOOLS, Constants, Tile, compile_sweep, start_driven, tile_for
+from weftform.solver.cuda.launch import COMPILE_ONLY, S_TOOLS, Constants, Tile, tile_for
+from weftform.solver.cuda.sweep import compile_sweep, start_driven
 from weftform.solver.layout import Layout
 from weftform.solver.loop import (
     C_DRIVE_WORK,

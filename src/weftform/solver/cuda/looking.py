@@ -21,7 +21,7 @@ from weftform.solver import energies, survey
 from weftform.solver import layout as at
 from weftform.solver.cuda.elements import covariant_vectors
 from weftform.solver.cuda.functions import device_function, dot, minus, vector_at
-from weftform.solver.cuda.sweep import Constants
+from weftform.solver.cuda.launch import Constants
 from weftform.solver.layout import Layout
 
 # what a row finds in a survey; all but the first are largest values
