@@ -183,6 +183,7 @@ class CudaDriver:
         for s in range(made):
             self._launch(s, schedule, table, pose, state, work)
             self._now, self._new = self._new, self._now
+        cuda.synchronize()  # type: ignore[no-untyped-call]  # who measures the time of steps shall see it
         if len(poses):
             poses[:] = pose.copy_to_host()
         if len(driven_state):
