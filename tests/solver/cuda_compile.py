@@ -18,7 +18,7 @@ from weftform.solver.cuda import driver, launch, looking, sweep
 
 HOPPER = (9, 0)
 LINE, TABLE = types.float64[::1], types.float64[:, ::1]
-BYTES, WORDS = types.int8[:, ::1], types.int32[:, ::1]
+BYTES, WORDS, PLACES = types.int8[:, ::1], types.int32[:, ::1], types.int64[::1]
 MODES, COUNT = types.float64[:, :, ::1], types.int64
 
 
@@ -31,9 +31,10 @@ def constants_of(case):
         **{"survey.return_value": found, "enter_ledger.return_value": np.zeros(energies.ENTRIES)},
         **{"kinetic_energy.return_value": 0.0},
     )
-    with mock.patch.object(driver, "CudaDriver", lambda *a, **k: given.extend(a) or stand_in):
+    with mock.patch.object(driver, "CudaDriver", lambda *a: given.extend(a) or stand_in):
         Simulation(CASES[case](), device="cuda")
-    return given[:2]
+    _, layout, material, sheet, machine, _ = given
+    return layout, launch.Constants.of(material, layout, sheet.rows, sheet.columns, len(machine.mode_motion))
 
 
 def check(name, kernel, *arguments):
@@ -54,9 +55,12 @@ if __name__ == "__main__":
         except Exception as problem:
             sys.exit(print(f"no compiler: {problem}"))
         check(
-            "sweep", sweep.compile_sweep(layout, constants, tile), LINE, LINE, LINE, TABLE, TABLE, BYTES, TABLE, COUNT,
-            TABLE, types.int32[::1], WORDS, BYTES, MODES, TABLE, LINE,
+            "sweep", sweep.compile_sweep(layout, constants, tile), LINE, LINE, LINE, LINE, PLACES, LINE, TABLE, TABLE,
+            TABLE, BYTES, TABLE, COUNT, TABLE, types.int32[::1], WORDS, BYTES, MODES, TABLE, LINE,
         )  # fmt: skip
-        check("survey", looking.compile_survey(layout, constants, 128), LINE, LINE, TABLE, TABLE, TABLE)
-        check("ledger", looking.compile_ledger(layout, constants, 128), LINE, LINE, TABLE, TABLE, LINE, LINE, TABLE)
-        check("start", sweep.start_driven, LINE, TABLE, COUNT, COUNT, types.int64[::1], BYTES, MODES, TABLE)
+        check("survey", looking.compile_survey(layout, constants, 128), LINE, LINE, PLACES, TABLE, TABLE, TABLE)
+        check(
+            "ledger", looking.compile_ledger(layout, constants, 128), LINE, LINE, LINE, PLACES, LINE, TABLE, TABLE, LINE,
+            LINE, TABLE,
+        )  # fmt: skip
+        check("start", sweep.start_driven, LINE, TABLE, COUNT, COUNT, PLACES, BYTES, MODES, TABLE)

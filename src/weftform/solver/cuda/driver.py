@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from weftform.errors import DeviceError
 from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, survey
-from weftform.solver import layout as at
 from weftform.solver.cuda import looking
 from weftform.solver.cuda.functions import SIMULATED, python_function
 from weftform.solver.cuda.gpu import find_gpu
 from weftform.solver.cuda.interrupts import uninterrupted
-from weftform.solver.cuda.launch import COMPILE_ONLY, S_TOOLS, Constants, Tile, tile_for
+from weftform.solver.cuda.launch import COMPILE_ONLY, MOVING, S_TOOLS, Constants, Tile, kept_fields, tile_for
 from weftform.solver.cuda.sweep import compile_sweep, start_driven
 from weftform.solver.layout import Layout
 from weftform.solver.loop import (
@@ -38,13 +37,17 @@ from weftform.solver.loop import (
     T_MASS,
     T_MOTION,
 )
+from weftform.solver.machine import Machine
+from weftform.solver.material import Material
+from weftform.solver.problem import Problem
+from weftform.solver.sheet import Sheet
 
 Floats = NDArray[np.float64]
 
 value_of_motion = python_function(motion_value)
 """Called a few times per step from Python, where calling a compiled function gains nothing over its compilation."""
-MOVING = at.INVERSE_MASS
-"""Fields that a step changes for every crossing: position and velocity, kept twice."""
+ALL_PARTS = ("moving", "kept", "grip", "heats")
+"""What lives on the device, see :meth:`CudaDriver.sync`."""
 LOOKING_THREADS = 128
 """Threads of a block that looks at a row."""
 SIMULATOR_TILE = Tile(6, 3, 1)
@@ -56,22 +59,15 @@ class CudaDriver:
 
     Parameters
     ----------
-    layout
-        Where the fields lie.
-    constants
-        Laws, sizes.
-    integrals
-        Of the laws of warp and weft, for the ledger.
-    fields
-        Initial state, shape [rows, fields, stride]. One band: the rows of the grid in their order.
-    motions
-        (times, values, knots, ramp) of the motions, as the time loop takes them.
-    driven
-        (nodes in ``fields``, held, modes, motion of each mode, kind of each mode).
-    viscosity, damping, density
-        Dashpot [mm2], mass damping [1/s], mass per area [tonne/mm2] (:meth:`Simulation._advance`).
-    tile
-        Elements and threads of a block; chosen without.
+    problem
+        For its settings.
+    layout, material
+        Where the fields lie, and the laws.
+    sheet, machine
+        What the device starts from, and what :meth:`sync` brings up to date: state, friction tractions and heats. One
+        band: the local rows are the rows of the grid. Tools and driven crossings are kept up to date.
+    density
+        Mass per area [tonne/mm2].
 
     Raises
     ------
@@ -80,25 +76,39 @@ class CudaDriver:
     """
 
     def __init__(
-        self,
-        layout: Layout,
-        constants: Constants,
-        integrals: tuple[Floats, Floats],
-        fields: Floats,
-        motions: tuple[Floats, Floats, NDArray[np.int64], float],
-        driven: tuple[NDArray[np.int64], NDArray[np.bool_], Floats, NDArray[np.int64], NDArray[np.int64]],
-        *,
-        viscosity: float,
-        damping: float,
-        density: float,
-        tile: Tile | None = None,
+        self, problem: Problem, layout: Layout, material: Material, sheet: Sheet, machine: Machine, density: float
     ) -> None:
         self.gpu = find_gpu()
-        self.layout, self.constants = layout, constants
-        self.rows, self.columns = constants.rows, constants.columns
-        self._motions, self._mode_motion, self._mode_kind = motions, driven[3], driven[4]
-        self._viscosity, self._damping, self._density = viscosity, damping, density
-        needed = fields.nbytes + 2 * 8 * self.rows * MOVING * layout.stride
+        settings = problem.settings
+        self.layout, self.sheet, self.machine = layout, sheet, machine
+        self.rows, self.columns = sheet.rows, sheet.columns
+        self._viscosity = settings.viscosity * problem.grid.cell_area
+        self._damping, self._density = settings.damping, density
+        sums = layout.tools + layout.driven
+        self.tile = SIMULATOR_TILE if SIMULATED else tile_for(sums)
+        self._look_threads = SIMULATOR_TILE.threads if SIMULATED else LOOKING_THREADS
+        self._blocks = self.tile.grid(self.rows, self.columns)
+        self._shared = self.tile.shared_bytes(sums)
+        self._accounts = self._blocks[0] * self._blocks[1] * self.tile.threads
+        self._check_memory()
+        constants = Constants.of(material, layout, self.rows, self.columns, len(machine.mode_motion))
+        self._sweep = compile_sweep(layout, constants, self.tile)
+        self._survey = looking.compile_survey(layout, constants, self._look_threads)
+        self._ledger = looking.compile_ledger(layout, constants, self._look_threads)
+        self._integrals = _on_device(*(integrals for _, integrals, *_ in material.laws[:2]))
+        self._traits, self._trait_rows = _on_device(sheet.traits.reshape(-1), sheet.trait_rows)
+        self._partial, self._finished, self._touching = _on_device(
+            np.zeros((max(sums, 1), self._blocks[0] * self._blocks[1])),
+            np.zeros(1, np.int32),
+            np.full((layout.tools, self.rows), survey.TOUCHING, np.int8),
+        )
+        self._lay_out_driven()
+        self.send()
+
+    def _check_memory(self) -> None:
+        sheet, heats = self.sheet, 8 * self._accounts * (1 + self.layout.tools)
+        moving = sheet.state[:, :MOVING].nbytes
+        needed = sheet.state.nbytes + moving + sheet.traits.nbytes + self.machine.grip.nbytes + heats
         if needed > self.gpu.memory:
             raise DeviceError(
                 "the blank does not fit into the memory of the GPU",
@@ -107,108 +117,109 @@ class CudaDriver:
                 got=f"{self.gpu.memory / 2**20:.0f} MiB",
                 hint="take longer cells (blank.cell_length_mm), or run with --device cpu",
             )
-        sums = layout.tools + layout.driven
-        self.tile = tile or (SIMULATOR_TILE if SIMULATED else tile_for(sums))
-        self._look_threads = SIMULATOR_TILE.threads if SIMULATED else LOOKING_THREADS
-        self._blocks = self.tile.grid(self.rows, self.columns)
-        self._shared = self.tile.shared_bytes(sums)
-        self._sweep = compile_sweep(layout, constants, self.tile)
-        self._survey = looking.compile_survey(layout, constants, self._look_threads)
-        self._ledger = looking.compile_ledger(layout, constants, self._look_threads)
-        self._integrals = tuple(cuda.to_device(np.ascontiguousarray(i)) for i in integrals)
-        self._partial = cuda.to_device(np.zeros((max(sums, 1), self._blocks[0] * self._blocks[1])))
-        self._finished = cuda.to_device(np.zeros(1, np.int32))
-        self._touching = cuda.to_device(np.full((max(layout.tools, 1), self.rows), survey.TOUCHING, np.int8))
-        self._lay_out_driven(*driven[:3])
-        self.send(fields)
 
-    def _lay_out_driven(self, nodes: NDArray[np.int64], held: NDArray[np.bool_], modes: Floats) -> None:
-        row, column = np.divmod(nodes, self.layout.row)
+    def _lay_out_driven(self) -> None:
+        machine = self.machine
+        row, column = np.divmod(machine.nodes, self.layout.row)
         place = np.full((self.rows, self.columns), -1, np.int32)
-        place[row, column] = np.arange(len(nodes))
-        self._driven_count = len(nodes)
+        place[row, column] = np.arange(len(machine.nodes))
         self._driven_place, self._driven_nodes, self._held, self._modes = _on_device(
-            place, row * MOVING * self.layout.stride + column, held.astype(np.int8), modes
+            place, row * MOVING * self.layout.stride + column, machine.held.astype(np.int8), machine.modes
         )
 
     # -- state -------------------------------------------------------------------------------------------------------
 
-    def send(self, fields: Floats) -> None:
-        """Replace the state on the device by ``fields``, shape [rows, fields, stride]."""
-        moving = np.ascontiguousarray(fields[:, :MOVING]).reshape(-1)
-        self._now, self._new = cuda.to_device(moving), cuda.to_device(moving)
-        self._fields = cuda.to_device(np.ascontiguousarray(fields).reshape(-1))
-        self._moving_ahead = self._fields_ahead = False
+    def send(self) -> None:
+        """Replace what is on the device by what the host has."""
+        state = self.sheet.state
+        moving, kept = state[:, :MOVING].reshape(-1), state[:, MOVING:].reshape(-1)
+        self._now, self._new, self._kept, self._grip = _on_device(moving, moving, kept, self.machine.grip.reshape(-1))
+        self._clear_heats()
+        self._ahead: set[str] = set()
 
-    def fetch_moving(self, fields: Floats) -> None:
-        """Bring positions and velocities in ``fields`` up to date."""
-        if self._moving_ahead:
-            fields[:, :MOVING] = self._now.copy_to_host().reshape(self.rows, MOVING, -1)
-            self._moving_ahead = False
+    def _clear_heats(self) -> None:
+        self._heats = cuda.to_device(np.zeros((1 + self.layout.tools, self._accounts)))
 
-    def fetch(self, fields: Floats) -> None:
-        """Bring all of ``fields`` up to date."""
-        if self._fields_ahead:
-            kept = fields[:, :MOVING].copy()
-            self._fields.copy_to_host(fields.reshape(-1))
-            fields[:, :MOVING] = kept
-            self._fields_ahead = False
-        self.fetch_moving(fields)
+    def sync(self, *parts: str) -> None:
+        """Bring the host up to date.
+
+        Parameters
+        ----------
+        parts
+            ``moving`` (positions and velocities), ``kept`` (all other fields of the state), ``grip``, ``heats``; all
+            of them without.
+        """
+        for part in self._ahead & set(parts or ALL_PARTS):
+            self._ahead.discard(part)
+            if part == "moving":
+                self.sheet.state[:, :MOVING] = self._now.copy_to_host().reshape(self.rows, MOVING, -1)
+            elif part == "kept":
+                self.sheet.state[:, MOVING:] = self._kept.copy_to_host().reshape(self.rows, kept_fields(self.layout), -1)
+            elif part == "grip" and self.layout.tools:
+                self._grip.copy_to_host(self.machine.grip.reshape(-1))
+            elif part == "heats":
+                # booked on the first row of each row of blocks, on top of what there was before
+                found = self._heats.copy_to_host().reshape(1 + self.layout.tools, self._blocks[1], -1)
+                self.machine.heats[:: self.tile.rows - 1] += found.sum(axis=2).T
+                self._clear_heats()
 
     # -- steps -------------------------------------------------------------------------------------------------------
 
-    def advance(
-        self, clock: Floats, steps: int, stop: float, tools: Floats, poses: Floats, driven_state: Floats
-    ) -> int:
+    def advance(self, clock: Floats, steps: int, stop: float) -> int:
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made.
 
-        ``clock``, ``poses`` and ``driven_state`` are brought up to date, as by the time loop of the processor.
+        Clock, tools and driven crossings are brought up to date, as by the time loop of the processor.
         """
         with uninterrupted():
-            return self._advance(clock, steps, stop, tools, poses, driven_state)
+            return self._advance(clock, steps, stop)
 
-    def _advance(
-        self, clock: Floats, steps: int, stop: float, tools: Floats, poses: Floats, driven_state: Floats
-    ) -> int:
-        plan = self._schedule(clock, steps, stop, tools, poses)
+    def _advance(self, clock: Floats, steps: int, stop: float) -> int:
+        machine = self.machine
+        plan = self._schedule(clock, steps, stop)
         made = len(plan) - 1
         if made == 0:
             return 0
-        schedule, table, pose, state, work = _on_device(plan, tools, poses, driven_state, np.zeros(1))
-        if self._driven_count:
-            start_driven[-(-self._driven_count // 64), min(self._driven_count, 64)](
+        small = _on_device(plan, machine.tools, machine.poses, machine.driven, np.zeros(1))
+        schedule, _, poses, driven, work = small
+        count = len(machine.nodes)
+        if count:
+            start_driven[-(-count // 64), min(count, 64)](
                 self._now, schedule, self.layout.stride, S_TOOLS + self.layout.tools, self._driven_nodes, self._held,
-                self._modes, state,
+                self._modes, driven,
             )  # fmt: skip
         for s in range(made):
-            self._launch(s, schedule, table, pose, state, work)
+            self._launch(s, *small)
             self._now, self._new = self._new, self._now
         cuda.synchronize()  # type: ignore[no-untyped-call]  # who measures the time of steps shall see it
-        if len(poses):
-            poses[:] = pose.copy_to_host()
-        if len(driven_state):
-            driven_state[:] = state.copy_to_host()
+        if self.layout.tools:
+            machine.poses[:] = poses.copy_to_host()
+        if count:
+            machine.driven[:] = driven.copy_to_host()
             clock[C_DRIVE_WORK] += work.copy_to_host()[0]
-        self._moving_ahead = self._fields_ahead = True
+        self._ahead.update(ALL_PARTS)
         return made
 
-    def compile(self, tools: Floats, poses: Floats, driven_state: Floats) -> None:
+    def compile(self) -> None:
         """Compile the kernel of a step; those that look have been used by the first survey."""
-        self._launch(COMPILE_ONLY, *_on_device(np.zeros((1, S_TOOLS)), tools, poses, driven_state, np.zeros(1)))
+        machine = self.machine
+        small = _on_device(np.zeros((1, S_TOOLS)), machine.tools, machine.poses, machine.driven, np.zeros(1))
+        self._launch(COMPILE_ONLY, *small)
 
-    def _launch(self, s: int, schedule: Any, tools: Any, poses: Any, driven_state: Any, work: Any) -> None:
+    def _launch(self, s: int, schedule: Any, tools: Any, poses: Any, driven: Any, work: Any) -> None:
         """One step, from ``_now`` to ``_new``."""
         self._sweep[self._blocks, self.tile.threads, 0, self._shared](
-            self._now, self._new, self._fields, tools, poses, self._touching, schedule, s, self._partial,
-            self._finished, self._driven_place, self._held, self._modes, driven_state, work,
+            self._now, self._new, self._kept, self._traits, self._trait_rows, self._grip, self._heats, tools, poses,
+            self._touching, schedule, s, self._partial, self._finished, self._driven_place, self._held, self._modes,
+            driven, work,
         )  # fmt: skip
 
-    def _schedule(self, clock: Floats, steps: int, stop: float, tools: Floats, poses: Floats) -> Floats:
+    def _schedule(self, clock: Floats, steps: int, stop: float) -> Floats:
         """What changes from step to step and is known before (``S_`` constants); moves the clock.
 
         One row per step and an empty one behind the last.
         """
-        times, values, knots, ramp = self._motions
+        machine = self.machine
+        times, values, knots, ramp = machine.times, machine.values, machine.knots, machine.ramp
         step, last_step, inertia = (float(clock[c]) for c in (C_STEP, C_LAST_STEP, C_INERTIA))
         viscosity = self._viscosity * self._density * inertia / step
         rows: list[list[float]] = []
@@ -220,15 +231,15 @@ class CudaDriver:
             kick = mean / ((1.0 + loss) * inertia)
             damping = 0.25 * self._damping * self._density * inertia * mean
             row = [step, last_step, kick, keep, damping, viscosity, 1.0 / (step * keep)]
-            for k, tool in enumerate(tools):
+            for k, tool in enumerate(machine.tools):
                 motion = int(tool[T_MOTION])
                 at_time = time if tool[T_MASS] > 0.0 else time + step
                 row.append(
                     value_of_motion(times[motion], values[motion], knots[motion], ramp, at_time)
                     if motion >= 0
-                    else float(poses[k, P_Z])
+                    else float(machine.poses[k, P_Z])
                 )
-            for motion, kind in zip(self._mode_motion, self._mode_kind, strict=True):
+            for motion, kind in zip(machine.mode_motion, machine.mode_kind, strict=True):
                 value = value_of_motion(times[motion], values[motion], knots[motion], ramp, time + step)
                 row.append(math.cos(value) - 1.0 if kind == COSINE else math.sin(value) if kind == SINE else value)
             rows.append(row)
@@ -236,17 +247,18 @@ class CudaDriver:
             last_step = step
         clock[C_LAST_STEP] = last_step
         clock[C_STEPS_DONE] += len(rows)
-        width = S_TOOLS + len(tools) + len(self._mode_motion)
+        width = S_TOOLS + len(machine.tools) + len(machine.mode_motion)
         return np.array([*rows, [0.0] * width])
 
     # -- looking -----------------------------------------------------------------------------------------------------
 
-    def survey(self, tools: Floats, poses: Floats, reach: float, ahead: int, margin: float) -> Floats:
+    def survey(self, reach: float, ahead: int, margin: float) -> Floats:
         """What :func:`weftform.solver.survey.survey` returns; classes of the rows stay on the device."""
+        tools, poses = self.machine.tools, self.machine.poses
         entries = looking.R_TOOLS + 2 * len(tools)
         result = cuda.to_device(np.zeros((self.rows, entries)))
         self._survey[self.rows, self._look_threads, 0, 8 * entries * self._look_threads](
-            self._now, self._fields, *_on_device(tools, poses), result,
+            self._now, self._traits, self._trait_rows, *_on_device(tools, poses), result,
         )  # fmt: skip
         found = result.copy_to_host()
         self._inertia_sum = float(found[:, looking.R_INERTIA].sum())
@@ -266,29 +278,30 @@ class CudaDriver:
         shortest = -float(found[:, looking.R_SHORTEST].max())
         out[survey.SLACKEST] = math.sqrt(shortest) - 1.0 if shortest < math.inf else 0.0
         out[survey.HALF_TANGENT] = largest[looking.R_HALF_TANGENT]
-        touching = np.full((max(len(tools), 1), self.rows), survey.CLEAR, np.int8)
+        touching = np.full((len(tools), self.rows), survey.CLEAR, np.int8)
         for k, pose in enumerate(poses):
             gaps, edges = -found[:, looking.R_TOOLS + 2 * k], -found[:, looking.R_TOOLS + 2 * k + 1]
             way = 2.0 * (out[survey.FASTEST] * reach + abs(pose[P_Z] - pose[P_LAST_Z]) * ahead) + margin
             near = np.where(edges > way, survey.ON_FACE, survey.TOUCHING)
             touching[k] = np.where(gaps < way, near, survey.CLEAR)
             out[survey.PENETRATION] = max(out[survey.PENETRATION], -float(gaps.min()))
-        self._touching = cuda.to_device(touching)
+        (self._touching,) = _on_device(touching)
         return out
 
     def kinetic_energy(self, density: float) -> float:
         """Kinetic energy of the fabric at the last survey [mJ], for a mass per area ``density`` [tonne/mm2]."""
         return 0.5 * density * self._inertia_sum
 
-    def enter_ledger(self, tools: Floats, poses: Floats, density: float) -> Floats:
+    def enter_ledger(self) -> Floats:
         """What :func:`weftform.solver.energies.enter_ledger` returns."""
         result = cuda.to_device(np.zeros((self.rows, energies.ENTRIES)))
         self._ledger[self.rows, self._look_threads, 0, 8 * energies.ENTRIES * self._look_threads](
-            self._now, self._fields, *_on_device(tools, poses), *self._integrals, result,
+            self._now, self._kept, self._traits, self._trait_rows, self._grip,
+            *_on_device(self.machine.tools, self.machine.poses), *self._integrals, result,
         )  # fmt: skip
-        self._fields_ahead = True
+        self._ahead.add("kept")
         entry: Floats = result.copy_to_host().sum(axis=0)
-        entry[energies.KINETIC] *= density
+        entry[energies.KINETIC] *= self._density
         return entry
 
 

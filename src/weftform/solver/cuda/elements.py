@@ -1,19 +1,17 @@
 """Forces of the elements on the device: connector, cell, contact. Tuples of three are vectors.
 
-The same equations as the row loops of the processor (:mod:`weftform.solver.rows`), each by the scalar functions of
+The same equations as the row loops of the processor (:mod:`weftform.solver.rows`, ``contact_rows``), each by the scalar functions of
 :mod:`weftform.mechanics`; a thread has one element, so nothing is arranged for vector units here.
 """
 
 from __future__ import annotations
 
-import math
-
 from weftform.mechanics.connector import connector_force
 from weftform.mechanics.contact import coulomb, rounded_edge
 from weftform.mechanics.membrane import covariant_forces, half_tangent, log_stretch, shear_stress
+from weftform.mechanics.roots import inverse_root
+from weftform.solver.contact_rows import SMALL
 from weftform.solver.cuda.functions import combine, device_function, dot, minus
-
-SMALL = 1.0e-12
 
 
 @device_function
@@ -27,7 +25,7 @@ def connector_pull(way, rate, weight, inverse_length, viscosity, law):
     weight
         Yarns it stands for.
     viscosity
-        Of its dashpot [N s/mm].
+        Of its dashpot, over the squared initial length [N s/mm3].
     law
         (coefficients, degree, pieces, width, end slope, slack slope).
 
@@ -35,12 +33,13 @@ def connector_pull(way, rate, weight, inverse_length, viscosity, law):
     -------
     Force on the start [N], a vector, and heat [mJ/s].
     """
-    length = math.sqrt(dot(way, way))
-    pull = connector_force(law[0], law[1], law[2], law[3], law[4], law[5], length * inverse_length - 1.0)
-    inverse = 1.0 / length
-    stretching = dot(way, rate) * inverse
+    squared = dot(way, way)
+    inverse = inverse_root(squared)
+    strain = squared * inverse * inverse_length - 1.0
+    pull = connector_force(law[0], law[1], law[2], law[3], law[4], law[5], strain)
+    stretching = dot(way, rate)
     drag = viscosity * stretching
-    f = weight * (pull + drag) * inverse
+    f = weight * (pull * inverse + drag)
     return (f * way[0], f * way[1], f * way[2]), weight * drag * stretching
 
 
@@ -91,13 +90,13 @@ def cell_forces(lower, upper, left, right, low, near, mirror, mirror_z, volume, 
 
 
 @device_function
-def tool_force(position, velocity, stick, area, tools, k, tool_z, tool_step, step, on_face):
-    """Force of tool ``k`` on a crossing, penalty and Coulomb friction.
+def tool_traction(position, velocity, held, tools, k, tool_z, tool_step, step, on_face):
+    """Force per area of tool ``k`` on a crossing, penalty and Coulomb friction.
 
     Parameters
     ----------
-    stick
-        Friction force at the last evaluation [N].
+    held
+        Friction traction at the last evaluation [MPa].
     tools
         Table of the tools (``T_`` constants of :mod:`weftform.solver.loop`).
     tool_step, step
@@ -107,24 +106,26 @@ def tool_force(position, velocity, stick, area, tools, k, tool_z, tool_step, ste
 
     Returns
     -------
-    Force on the crossing, its friction part [N], and the friction heat times tangential stiffness [N^2].
+    Traction on the crossing, its friction part [MPa], and the friction heat per area times tangential stiffness per
+    area [MPa^2].
     """
     if on_face:
         distance = tools[k, 2] * (position[2] - tool_z - tools[k, 3]) - tools[k, 4]
         normal = (0.0, 0.0, tools[k, 2])
     else:
-        away = math.sqrt(position[0] * position[0] + position[1] * position[1])
+        squared = position[0] * position[0] + position[1] * position[1]
+        inverse = inverse_root(max(squared, SMALL))
         distance, normal_s, normal_z = rounded_edge(
-            away, position[2] - tool_z, tools[k, 0], tools[k, 1], tools[k, 2], tools[k, 3], tools[k, 4]
+            squared * inverse, position[2] - tool_z, tools[k, 0], tools[k, 1], tools[k, 2], tools[k, 3], tools[k, 4]
         )
-        radial = normal_s / max(away, SMALL)
+        radial = normal_s * inverse
         normal = (position[0] * radial, position[1] * radial, normal_z)
-    stiffness = tools[k, 6] * area
+    stiffness = tools[k, 6]
     press = stiffness * max(tools[k, 5] - distance, 0.0)
     tangential = tools[k, 8] * stiffness
-    wx = stick[0] - tangential * (velocity[0] * step)
-    wy = stick[1] - tangential * (velocity[1] * step)
-    wz = stick[2] - tangential * (velocity[2] * step - tool_step)
+    wx = held[0] - tangential * (velocity[0] * step)
+    wy = held[1] - tangential * (velocity[1] * step)
+    wz = held[2] - tangential * (velocity[2] * step - tool_step)
     along = wx * normal[0] + wy * normal[1] + wz * normal[2]
     fx, fy, fz, heat = coulomb(
         wx - along * normal[0], wy - along * normal[1], wz - along * normal[2], tools[k, 7] * press

@@ -8,6 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from weftform.solver import layout as at
+from weftform.solver.layout import Layout
+from weftform.solver.material import Material
+
+MOVING = at.LEDGER
+"""Fields that a step changes for every crossing: position and velocity, kept twice."""
 SHARED_BYTES = 48 * 1024
 """Shared memory that a block may have on every GPU without asking."""
 SLOTS = 10
@@ -30,12 +36,18 @@ COMPILE_ONLY = -1
 """Step that is none: the kernel does nothing."""
 
 
+def kept_fields(layout: Layout) -> int:
+    """Fields of the state that a step does not move: the ledger, and the force where crossings are driven."""
+    return layout.fields - MOVING
+
+
 @dataclass(frozen=True, eq=False)
 class Constants:
     """Numbers compiled into the kernels: laws and sizes.
 
     A law is (coefficients, degree, pieces, width, end slope, slack slope); the coefficients of a polynomial are a
-    tuple, those of many pieces an array.
+    tuple, those of many pieces an array. ``membrane`` is for mean edge vectors: (1 / warp pitch, 1 / weft pitch,
+    E warp, E weft, hourglass, mirror signs x, y).
     """
 
     warp_law: tuple[Any, ...]
@@ -46,6 +58,24 @@ class Constants:
     columns: int
     rows: int
     modes: int
+
+    @staticmethod
+    def of(material: Material, layout: Layout, rows: int, columns: int, modes: int) -> Constants:
+        """Of a material on a grid, with so many modes of driven crossings."""
+        warp, weft, shear = (
+            (law, *material.shapes[2 * k : 2 * k + 2], *material.ends[k].tolist())
+            for k, law in enumerate(material.loop_laws)
+        )
+        return Constants(
+            warp_law=warp,
+            weft_law=weft,
+            shear_law=shear,
+            series=tuple(material.series.tolist()),
+            membrane=(material.warp_inverse, material.weft_inverse, *material.membrane[3:].tolist()),
+            columns=columns,
+            rows=rows,
+            modes=modes,
+        )
 
     @cached_property
     def _key(self) -> tuple[Any, ...]:

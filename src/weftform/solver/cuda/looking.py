@@ -20,8 +20,8 @@ from weftform.mechanics.membrane import half_tangent, log_stretch, shear_stress
 from weftform.solver import energies, survey
 from weftform.solver import layout as at
 from weftform.solver.cuda.elements import covariant_vectors
-from weftform.solver.cuda.functions import device_function, dot, minus, vector_at
-from weftform.solver.cuda.launch import Constants
+from weftform.solver.cuda.functions import device_function, dot, minus, put_vector, vector_at
+from weftform.solver.cuda.launch import MOVING, Constants, kept_fields
 from weftform.solver.layout import Layout
 
 # what a row finds in a survey; all but the first are largest values
@@ -70,13 +70,13 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
     """Kernel: what each row finds, into an array of shape [rows, R_TOOLS + 2 tools]."""
     stride = np.uint64(layout.stride)
     columns = constants.columns
-    moving_row, fields_row = 6 * layout.stride, layout.row
+    moving_row, traits_row = MOVING * layout.stride, layout.traits * layout.stride
     up = np.uint64(moving_row)
     one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
-    area_field, inertia_field, warp_line, weft_line, volume_field, edge_weight = (
+    area_field, inertia_field, warp_line, weft_line, volume_field, lower_weight, left_weight = (
         np.uint64(field * layout.stride)
-        for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME, layout.edge_weight)
+        for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME, at.LOWER_WEIGHT, at.LEFT_WEIGHT)
     )
     half_cells, tools = bool(layout.half_cells), layout.tools
     entries = R_TOOLS + 2 * tools
@@ -87,14 +87,14 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
     rounded, tangent = device_function(rounded_edge), device_function(half_tangent)
 
     @device_function
-    def look_at_crossing(moving, fields, table, poses, shared, thread, m, n):
+    def look_at_crossing(moving, traits, table, poses, shared, thread, m, t):
         """Speed, gaps and stretches of the connectors that start here; whether the crossing is out of all bounds."""
         here = vector_at(moving, m, stride)
         pace = vector_at(moving, m + velocity, stride)
         speed = dot(pace, pace)
         if not (speed < fastest_allowed and math.isfinite(here[0] + here[1] + here[2])):
             return True
-        shared[R_INERTIA * threads + thread] += fields[n + inertia_field] * speed
+        shared[R_INERTIA * threads + thread] += traits[t + inertia_field] * speed
         keep_largest(shared, R_FASTEST * threads + thread, speed)
         away = math.sqrt(here[0] * here[0] + here[1] * here[1])
         for k in range(tools):
@@ -104,12 +104,12 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
             keep_largest(shared, (R_TOOLS + 2 * k) * threads + thread, table[k, 5] - distance)
             keep_largest(shared, (R_TOOLS + 2 * k + 1) * threads + thread, table[k, 0] * (away - table[k, 1]))
         bad = False
-        if fields[n + warp_line] > 0.0:
+        if traits[t + warp_line] > 0.0:
             squared = squared_stretch(moving, m, one, stride, i1)
             keep_largest(shared, R_WARP * threads + thread, squared)
             keep_largest(shared, R_SHORTEST * threads + thread, -squared)
             bad = squared > longest_allowed
-        if fields[n + weft_line] > 0.0:
+        if traits[t + weft_line] > 0.0:
             squared = squared_stretch(moving, m, up, stride, i2)
             keep_largest(shared, R_WEFT * threads + thread, squared)
             keep_largest(shared, R_SHORTEST * threads + thread, -squared)
@@ -117,13 +117,13 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
         return bad
 
     @device_function
-    def look_at_cell(moving, fields, shared, thread, m, n):
+    def look_at_cell(moving, traits, shared, thread, m, t):
         """Shear of a cell; of a half cell on a plane of symmetry what is modelled, as weftform.solver.survey does."""
         low = 0.5
         near = 0.5
         if half_cells:
-            low = fields[n + edge_weight]
-            near = fields[n + edge_weight + stride]
+            low = traits[t + lower_weight]
+            near = traits[t + left_weight]
         a = vector_at(moving, m, stride)
         b = vector_at(moving, m + one, stride)
         c = vector_at(moving, m + up, stride)
@@ -131,10 +131,10 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
         g1, g2 = covariant_vectors(
             minus(b, a), minus(d, c), minus(c, a), minus(d, b), low, near, 0.0, 0.0, 0.0, 0.0, i1, i2
         )
-        t = tangent(dot(g1, g1), dot(g2, g2), dot(g1, g2))
-        keep_largest(shared, R_HALF_TANGENT * threads + thread, abs(t))
+        sheared = abs(tangent(dot(g1, g1), dot(g2, g2), dot(g1, g2)))
+        keep_largest(shared, R_HALF_TANGENT * threads + thread, sheared)
 
-    def look(moving, fields, table, poses, found):
+    def look(moving, traits, trait_rows, table, poses, found):
         shared = cuda.shared.array(0, numba.float64)
         thread = cuda.threadIdx.x
         row = cuda.blockIdx.x
@@ -144,13 +144,13 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
         worst = 0
         for i in range(thread, columns, threads):
             m = np.uint64(row * moving_row + i)
-            n = np.uint64(row * fields_row + i)
-            if fields[n + area_field] > 0.0:
-                bad = look_at_crossing(moving, fields, table, poses, shared, thread, m, n)
+            t = np.uint64(trait_rows[row] * traits_row + i)
+            if traits[t + area_field] > 0.0:
+                bad = look_at_crossing(moving, traits, table, poses, shared, thread, m, t)
                 if bad:
                     worst = i + 1
-            if fields[n + volume_field] > 0.0:
-                look_at_cell(moving, fields, shared, thread, m, n)
+            if traits[t + volume_field] > 0.0:
+                look_at_cell(moving, traits, shared, thread, m, t)
         shared[R_WORST * threads + thread] = float(worst)
         width = threads
         cuda.syncthreads()
@@ -174,27 +174,23 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     """Kernel: energies of each row [mJ] (for the whole density 1), into an array of shape [rows, energies.ENTRIES]."""
     stride = np.uint64(layout.stride)
     columns = constants.columns
-    moving_row, fields_row = 6 * layout.stride, layout.row
+    moving_row, kept_row, traits_row = MOVING * layout.stride, kept_fields(layout) * layout.stride, layout.traits * layout.stride
     up = np.uint64(moving_row)
     one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
-    area_field, inertia_field, damped, warp_line, weft_line, volume_field, memory, edge_weight, first_tool = (
-        np.uint64(field * layout.stride)
-        for field in (
-            at.AREA, at.INERTIA, at.DAMPED, at.WARP_LINE, at.WEFT_LINE, at.VOLUME, at.LEDGER, layout.edge_weight,
-            layout.tool,
-        )
-    )  # fmt: skip
-    tool_row = np.uint64(at.TOOL_FIELDS * layout.stride)
+    area_field, inertia_field, warp_line, weft_line, volume_field = (
+        np.uint64(field * layout.stride) for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME)
+    )
+    lower_weight, left_weight, mirror_field, mirror_z_field = (
+        np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
+    )
+    memory, grip_row = np.uint64((at.LEDGER - MOVING) * layout.stride), 3 * layout.stride
     half_cells, tools = bool(layout.half_cells), layout.tools
     entries = energies.ENTRIES
-    kinetic, connectors, membrane_work, hourglass, contact, friction, damping = (
+    kinetic, connectors, membrane_work, hourglass, contact = (
         entry * threads
-        for entry in (
-            energies.KINETIC, energies.CONNECTORS, energies.MEMBRANE, energies.HOURGLASS, energies.CONTACT,
-            energies.FRICTION, energies.DAMPED,
-        )
-    )  # fmt: skip
+        for entry in (energies.KINETIC, energies.CONNECTORS, energies.MEMBRANE, energies.HOURGLASS, energies.CONTACT)
+    )
     warp_law, weft_law, law = constants.warp_law, constants.weft_law, constants.shear_law
     series, membrane = constants.series, constants.membrane
     i1, i2 = membrane[0], membrane[1]
@@ -202,42 +198,37 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     stress, log_of = device_function(shear_stress), device_function(log_stretch)
 
     @device_function
-    def add_crossing(moving, fields, table, poses, shared, thread, m, n):
-        """Kinetic energy, contact, friction and damping of a crossing."""
-        area = fields[n + area_field]
+    def add_crossing(moving, traits, grip, table, poses, shared, thread, m, t, row, i):
+        """Kinetic energy and contact of a crossing."""
+        area = traits[t + area_field]
         here = vector_at(moving, m, stride)
         pace = vector_at(moving, m + velocity, stride)
-        shared[kinetic + thread] += 0.5 * fields[n + inertia_field] * dot(pace, pace)
-        shared[damping + thread] += fields[n + damped]
+        shared[kinetic + thread] += 0.5 * traits[t + inertia_field] * dot(pace, pace)
         away = math.sqrt(here[0] * here[0] + here[1] * here[1])
         for k in range(tools):
             distance, _, _ = rounded(
                 away, here[2] - poses[k, 0], table[k, 0], table[k, 1], table[k, 2], table[k, 3], table[k, 4]
             )
             gap = distance - table[k, 5]
-            field = n + first_tool + np.uint64(k) * tool_row
-            stiffness = table[k, 6] * area
-            shared[friction + thread] += fields[field + stride + stride + stride] / (table[k, 8] * stiffness)
             if gap < 0.0:
-                stick = vector_at(fields, field, stride)
-                shared[contact + thread] += 0.5 * stiffness * gap * gap + 0.5 * dot(stick, stick) / (
-                    table[k, 8] * stiffness
-                )
+                held = vector_at(grip, np.uint64((row * tools + k) * grip_row + i), stride)
+                stretched = dot(held, held) / (table[k, 8] * table[k, 6])
+                shared[contact + thread] += 0.5 * area * (table[k, 6] * gap * gap + stretched)
 
     @device_function
-    def add_cell(moving, fields, shared, thread, m, n):
+    def add_cell(moving, kept, traits, shared, thread, m, n, t):
         """Hourglass energy of a cell, and its membrane work since the last entry by Simpson's rule, straight in
         (ln l1, ln l2, gamma)."""
-        volume = fields[n + volume_field]
+        volume = traits[t + volume_field]
         low = 0.5
         near = 0.5
         q = 0.0
         mirror_z = 0.0
         if half_cells:
-            low = fields[n + edge_weight]
-            near = fields[n + edge_weight + stride]
-            q = fields[n + edge_weight + stride + stride]
-            mirror_z = fields[n + edge_weight + stride + stride + stride]
+            low = traits[t + lower_weight]
+            near = traits[t + left_weight]
+            q = traits[t + mirror_field]
+            mirror_z = traits[t + mirror_z_field]
         a = vector_at(moving, m, stride)
         b = vector_at(moving, m + one, stride)
         c = vector_at(moving, m + up, stride)
@@ -252,12 +243,12 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         )
         g11 = dot(g1, g1)
         g22 = dot(g2, g2)
-        t = tangent(g11, g22, dot(g1, g2))
+        tan_half = tangent(g11, g22, dot(g1, g2))
         e1 = log_of(g11, series)
         e2 = log_of(g22, series)
-        angle = 2.0 * math.atan(t)
+        angle = 2.0 * math.atan(tan_half)
         field = n + memory
-        o1, o2, oa = vector_at(fields, field, stride)
+        o1, o2, oa = vector_at(kept, field, stride)
         m1 = 0.5 * (e1 + o1)
         m2 = 0.5 * (e2 + o2)
         ma = 0.5 * (angle + oa)
@@ -266,19 +257,17 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         new = math.exp(e1 + e2) * math.cos(angle)
         old_tau = stress(law[0], law[1], law[2], law[3], law[4], math.tan(0.5 * oa))
         mid_tau = stress(law[0], law[1], law[2], law[3], law[4], math.tan(0.5 * ma))
-        tau = stress(law[0], law[1], law[2], law[3], law[4], t)
-        work = fields[field + stride + stride + stride] + volume / 6.0 * (
+        tau = stress(law[0], law[1], law[2], law[3], law[4], tan_half)
+        work = kept[field + stride + stride + stride] + volume / 6.0 * (
             membrane[2] * simpson(old * o1, mid * m1, new * e1) * (e1 - o1)
             + membrane[3] * simpson(old * o2, mid * m2, new * e2) * (e2 - o2)
             + simpson(old * old_tau, mid * mid_tau, new * tau) * (angle - oa)
         )
-        fields[field] = e1
-        fields[field + stride] = e2
-        fields[field + stride + stride] = angle
-        fields[field + stride + stride + stride] = work
+        put_vector(kept, field, stride, (e1, e2, angle))
+        kept[field + stride + stride + stride] = work
         shared[membrane_work + thread] += work
 
-    def enter(moving, fields, table, poses, warp_integrals, weft_integrals, found):
+    def enter(moving, kept, traits, trait_rows, grip, table, poses, warp_integrals, weft_integrals, found):
         shared = cuda.shared.array(0, numba.float64)
         thread = cuda.threadIdx.x
         row = cuda.blockIdx.x
@@ -286,17 +275,18 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
             shared[entry * threads + thread] = 0.0
         for i in range(thread, columns, threads):
             m = np.uint64(row * moving_row + i)
-            n = np.uint64(row * fields_row + i)
-            if fields[n + area_field] > 0.0:
-                add_crossing(moving, fields, table, poses, shared, thread, m, n)
-            warp = fields[n + warp_line]
+            n = np.uint64(row * kept_row + i)
+            t = np.uint64(trait_rows[row] * traits_row + i)
+            if traits[t + area_field] > 0.0:
+                add_crossing(moving, traits, grip, table, poses, shared, thread, m, t, row, i)
+            warp = traits[t + warp_line]
             if warp > 0.0:
                 shared[connectors + thread] += line_energy(moving, m, one, stride, warp, i1, warp_law, warp_integrals)
-            weft = fields[n + weft_line]
+            weft = traits[t + weft_line]
             if weft > 0.0:
                 shared[connectors + thread] += line_energy(moving, m, up, stride, weft, i2, weft_law, weft_integrals)
-            if fields[n + volume_field] > 0.0:
-                add_cell(moving, fields, shared, thread, m, n)
+            if traits[t + volume_field] > 0.0:
+                add_cell(moving, kept, traits, shared, thread, m, n, t)
         width = threads
         cuda.syncthreads()
         while width > 1:

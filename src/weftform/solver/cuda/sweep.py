@@ -7,7 +7,7 @@ belong to the neighbouring tiles, gathers from its four elements, adds contact, 
 the same place and nothing is added atomically, so a run repeats bit for bit.
 
 Crossings move from one buffer of positions and velocities to another. The block that finishes last sums the tool
-forces of all blocks, in their order, and moves the tools.
+forces of all blocks, in their order, and moves the tools. Each thread keeps the sums of heat of its crossings.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ import numpy as np
 from numba import cuda
 
 from weftform.solver import layout as at
-from weftform.solver.cuda.elements import cell_forces, connector_pull, tool_force
+from weftform.solver.cuda.elements import cell_forces, connector_pull, tool_traction
 from weftform.solver.cuda.functions import combine, device_function, dot, minus, put_vector, vector_at
 from weftform.solver.cuda.launch import (
     COMPILE_ONLY,
+    MOVING,
     S_DAMPING,
     S_KEEP,
     S_KICK,
@@ -35,6 +36,7 @@ from weftform.solver.cuda.launch import (
     SLOTS,
     Constants,
     Tile,
+    kept_fields,
 )
 from weftform.solver.layout import Layout
 from weftform.solver.loop import (
@@ -89,17 +91,20 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
     columns, rows = constants.columns, constants.rows
     wide, size, threads = tile.columns, tile.columns * tile.rows, tile.threads
     own_columns, own_rows = tile.columns - 1, tile.rows - 1
-    moving_row, fields_row = 6 * layout.stride, layout.row
+    moving_row, kept_row, traits_row = MOVING * layout.stride, kept_fields(layout) * layout.stride, layout.traits * layout.stride
     up = np.uint64(moving_row)
     one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
-    inverse_mass, area_field, damped_field, inertia_field, warp_line, weft_line, volume_field = (
+    inverse_mass, area_field, inertia_field, warp_line, weft_line, volume_field = (
         np.uint64(field * layout.stride)
-        for field in (at.INVERSE_MASS, at.AREA, at.DAMPED, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME)
+        for field in (at.INVERSE_MASS, at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME)
+    )
+    lower_weight, left_weight, mirror_field, mirror_z_field = (
+        np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
     )
     half_cells, driven, tools = bool(layout.half_cells), bool(layout.driven), layout.tools
-    edge_weight, force_field = np.uint64(layout.edge_weight * layout.stride), np.uint64(layout.force * layout.stride)
-    first_tool, tool_row = np.uint64(layout.tool * layout.stride), np.uint64(at.TOOL_FIELDS * layout.stride)
+    force_field = np.uint64((layout.force - MOVING) * layout.stride)
+    grip_row = 3 * layout.stride
     sums = tools + layout.driven
     accumulators = SLOTS * size
     last_flag = accumulators + sums * threads
@@ -107,6 +112,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
     first_mode = S_TOOLS + tools
     warp_law, weft_law, shear_law = constants.warp_law, constants.weft_law, constants.shear_law
     series, membrane = constants.series, constants.membrane
+    i1, i2 = membrane[0], membrane[1]
 
     @device_function
     def corner(shared, element, first):
@@ -123,27 +129,27 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         shared[place + 2 * size] = force[2]
 
     @device_function
-    def compute_element(moving, fields, shared, element, m, n, viscosity):
-        """Forces of the cell and the connectors of the crossing at ``m`` and ``n`` on the other three corners."""
+    def compute_element(moving, traits, shared, element, m, t, viscosity):
+        """Forces of the cell and the connectors of the crossing at ``m``, its traits at ``t``, on the other three corners."""
         right = (0.0, 0.0, 0.0)
         upper = (0.0, 0.0, 0.0)
         opposite = (0.0, 0.0, 0.0)
         heat = 0.0
-        warp = fields[n + warp_line]
-        weft = fields[n + weft_line]
-        volume = fields[n + volume_field]
+        warp = traits[t + warp_line]
+        weft = traits[t + weft_line]
+        volume = traits[t + volume_field]
         here = vector_at(moving, m, stride)
         pace = vector_at(moving, m + velocity, stride)
         if warp > 0.0:
             way = minus(vector_at(moving, m + one, stride), here)
             rate = minus(vector_at(moving, m + one + velocity, stride), pace)
-            pull, power = connector_pull(way, rate, warp, membrane[0], viscosity, warp_law)
+            pull, power = connector_pull(way, rate, warp, i1, viscosity * i1 * i1, warp_law)
             right = minus(right, pull)
             heat += power
         if weft > 0.0:
             way = minus(vector_at(moving, m + up, stride), here)
             rate = minus(vector_at(moving, m + up + velocity, stride), pace)
-            pull, power = connector_pull(way, rate, weft, membrane[1], viscosity, weft_law)
+            pull, power = connector_pull(way, rate, weft, i2, viscosity * i2 * i2, weft_law)
             upper = minus(upper, pull)
             heat += power
         if volume > 0.0:
@@ -155,10 +161,10 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             mirror = 0.0
             mirror_z = 0.0
             if half_cells:
-                low = fields[n + edge_weight]
-                near = fields[n + edge_weight + stride]
-                mirror = fields[n + edge_weight + stride + stride]
-                mirror_z = fields[n + edge_weight + stride + stride + stride]
+                low = traits[t + lower_weight]
+                near = traits[t + left_weight]
+                mirror = traits[t + mirror_field]
+                mirror_z = traits[t + mirror_z_field]
             along_lower, along_upper, along_left, along_right = cell_forces(
                 minus(b, here), minus(d, c), minus(c, here), minus(d, b),
                 low, near, mirror, mirror_z, volume, membrane, shear_law, series,
@@ -185,32 +191,31 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         return minus(other, own)
 
     @device_function
-    def touch(fields, n, position, pace, force, table, poses, touching, row, last_step, shared, thread):
+    def touch(grip, heats, account, area, i, row, position, pace, force, table, poses, touching, last_step, shared, thread):
         """Add the forces of the tools that the row can touch."""
-        area = fields[n + area_field]
         for k in range(tools):
             stand = touching[k, row]
             if stand == CLEAR:
                 continue
-            field = n + first_tool + np.uint64(k) * tool_row
-            before = vector_at(fields, field, stride)
-            on, stick, heat = tool_force(
-                position, pace, before, area, table, k, poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z],
-                last_step, stand == ON_FACE,
+            place = np.uint64((row * tools + k) * grip_row + i)
+            before = vector_at(grip, place, stride)
+            on, held, heat = tool_traction(
+                position, pace, before, table, k, poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
+                stand == ON_FACE,
             )  # fmt: skip
             # most crossings of a row that can touch do not: nothing to store
-            if stick[0] != before[0] or stick[1] != before[1] or stick[2] != before[2]:
-                put_vector(fields, field, stride, stick)
+            if held[0] != before[0] or held[1] != before[1] or held[2] != before[2]:
+                put_vector(grip, place, stride, held)
             if heat != 0.0:
-                fields[field + stride + stride + stride] += heat
-            force = combine(1.0, force, 1.0, on)
-            shared[accumulators + k * threads + thread] += on[2]
+                heats[1 + k, account] += area * heat
+            force = combine(1.0, force, area, on)
+            shared[accumulators + k * threads + thread] += area * on[2]
         return force
 
     @device_function
-    def drive(fields, n, m, force, new, step, schedule, s, place, held, modes_of, state):
+    def drive(kept, n, m, force, new, step, schedule, s, place, held, modes_of, state):
         """Book the work on a driven crossing and give it the velocity of the next step; returns the work."""
-        put_vector(fields, n + force_field, stride, force)
+        put_vector(kept, n + force_field, stride, force)
         work = 0.0
         for c in range(3):
             if held[place, c] == 0:
@@ -228,8 +233,8 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         return work
 
     def sweep(
-        moving, new, fields, table, poses, touching, schedule, s, partial, finished, driven_place, held, modes_of, state,
-        drive_work,
+        moving, new, kept, traits, trait_rows, grip, heats, table, poses, touching, schedule, s, partial, finished,
+        driven_place, held, modes_of, state, drive_work,
     ):  # fmt: skip
         if s == COMPILE_ONLY:
             return
@@ -247,8 +252,8 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             j = first_row + element // wide
             if 0 <= i < columns and 0 <= j < rows:
                 m = np.uint64(j * moving_row + i)
-                n = np.uint64(j * fields_row + i)
-                compute_element(moving, fields, shared, element, m, n, viscosity)
+                t = np.uint64(trait_rows[j] * traits_row + i)
+                compute_element(moving, traits, shared, element, m, t, viscosity)
                 for k in range(tools):
                     if touching[k, j] != CLEAR:
                         touched = 1
@@ -261,22 +266,28 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             shared[accumulators + k * threads + thread] = 0.0
         block_sums = cuda.syncthreads_or(touched)
 
+        block = cuda.blockIdx.y * cuda.gridDim.x + cuda.blockIdx.x
+        account = block * threads + thread
+        damped = 0.0
         for element in range(thread, size, threads):
             i = first_column + element % wide
             j = first_row + element // wide
             if element % wide == 0 or element < wide or i >= columns or j >= rows:
                 continue
             m = np.uint64(j * moving_row + i)
-            n = np.uint64(j * fields_row + i)
-            if fields[n + area_field] <= 0.0:
+            t = np.uint64(trait_rows[j] * traits_row + i)
+            area = traits[t + area_field]
+            if area <= 0.0:
                 continue
             position = vector_at(moving, m, stride)
             pace = vector_at(moving, m + velocity, stride)
             inner = gather(shared, element)
             force = inner
             if tools > 0:
-                force = touch(fields, n, position, pace, inner, table, poses, touching, j, last_step, shared, thread)
-            inverse = vector_at(fields, n + inverse_mass, stride)
+                force = touch(
+                    grip, heats, account, area, i, j, position, pace, inner, table, poses, touching, last_step, shared, thread
+                )
+            inverse = vector_at(traits, t + inverse_mass, stride)
             after = (
                 keep * pace[0] + kick * inverse[0] * force[0],
                 keep * pace[1] + kick * inverse[1] * force[1],
@@ -285,18 +296,17 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             put_vector(new, m + velocity, stride, after)
             put_vector(new, m, stride, combine(1.0, position, step, after))
             twice = combine(1.0, pace, 1.0, after)
-            heat = step * shared[9 * size + element]
-            fields[n + damped_field] += damping * fields[n + inertia_field] * dot(twice, twice) + heat
+            damped += damping * traits[t + inertia_field] * dot(twice, twice) + step * shared[9 * size + element]
             if driven:
                 place = driven_place[j, i]
                 if place >= 0:
                     shared[accumulators + tools * threads + thread] += drive(
-                        fields, n, m, inner, new, step, schedule, s, place, held, modes_of, state
+                        kept, np.uint64(j * kept_row + i), m, inner, new, step, schedule, s, place, held, modes_of, state
                     )
+        heats[0, account] += damped
 
         if sums == 0:
             return
-        block = cuda.blockIdx.y * cuda.gridDim.x + cuda.blockIdx.x
         blocks = cuda.gridDim.x * cuda.gridDim.y
         if block_sums:
             add_up(shared, thread)
