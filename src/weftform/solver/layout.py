@@ -110,8 +110,8 @@ class Layout:
 
     @property
     def edge_scratch(self) -> int:
-        """Numbers of scratch for edges: warp, carried to the row above, left and right share of the weft edges."""
-        return 4 * self.block
+        """Numbers of scratch for edges: warp, carried to the row above, right share of the weft edges."""
+        return 3 * self.block
 
     @property
     def node_scratch(self) -> int:

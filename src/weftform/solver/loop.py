@@ -1,7 +1,7 @@
 """The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
 
-Order within a sweep, for each row: warp connectors, contact, cells above, weft connectors above, update. A row is
-updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its
+Order within a sweep, for each row: contact, then its warp connectors with the cells and weft connectors above, then
+the update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its
 neighbours' edge rows (halos), refreshed before each step, so no thread reads what another writes, and every row is
 computed by the same operations in the same order whatever the number of bands.
 """
@@ -20,7 +20,7 @@ from weftform.mechanics.motion import motion_value
 from weftform.solver import layout as at
 from weftform.solver.contact_rows import contact_row, face_row
 from weftform.solver.layout import Layout
-from weftform.solver.rows import cell_row, update_row, warp_row, weft_row
+from weftform.solver.rows import carry_row, fabric_row, update_row, warp_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
 from weftform.solver.survey import ON_FACE
 
@@ -88,19 +88,13 @@ def _sweep_band(
     flush_subnormals()
     for k in range(block):
         edge[block + k] = 0.0
-        node[k] = 0.0
+        node[block + k] = 0.0
     own_first = first + (1 if band > 0 else 0)
     own_last = last - (1 if band < bands - 1 else 0)
     for r in range(first, own_last + 1):
         row = np.uint64(r) * np.uint64(row_length)
         trait = np.uint64(trait_rows[r]) * np.uint64(trait_length)
         if r >= own_first:
-            begin = spans[r, 2]
-            warp_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
-                edge[begin:], node[begin:], stride,
-                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
-            )  # fmt: skip
             for k in range(tools):
                 reaction = 0.0
                 heat = 0.0
@@ -125,25 +119,28 @@ def _sweep_band(
                 heats[r, 1 + k] += heat
         if r < last:
             begin = spans[r, 4]
-            count = np.uint64(spans[r, 5])
-            cell_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), count, edge[begin:], stride,
-                row_length, half_cells, membrane, shear_degree, shear_pieces, shear_law, ends[2], series,
-            )  # fmt: skip
-            weft_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), count, edge[begin:], node[begin:],
-                stride, row_length, half_cells, weft_inverse, viscosity * weft_inverse * weft_inverse,
-                weft_degree, weft_pieces, weft_law, ends[1],
+            fabric_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 5]),
+                edge[begin:], node[begin:], stride, row_length, half_cells, membrane, series,
+                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law,
+                weft_inverse, viscosity * weft_inverse * weft_inverse, weft_degree, weft_pieces, weft_law,
+                shear_degree, shear_pieces, shear_law, ends,
             )  # fmt: skip
         else:
-            for k in range(block):
-                node[k] = 0.0
-        if r >= own_first:
-            begin = spans[r, 0]
-            heats[r, 0] += update_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 1]), edge[begin:],
-                node[begin:], stride, step, kick, keep, damping, driven, force_field,
+            begin = spans[r, 2]
+            warp_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
+                edge[begin:], node[begin:], stride,
+                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
             )  # fmt: skip
+        begin = spans[r, 2]
+        if r >= own_first:
+            heats[r, 0] += update_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
+                edge[begin:], node[begin:], stride, step, kick, keep, damping, driven, force_field,
+            )  # fmt: skip
+        else:
+            carry_row(np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride)
 
 
 @cache

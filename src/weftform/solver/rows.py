@@ -6,9 +6,9 @@ Shifted reads (``i - 1``) are from another array than the one written: a load th
 previous iteration would stop the vectoriser. Every loop runs over whole blocks of ``layout.LANES`` places, so no row
 ends in a scalar remainder; what lies in the padding has no mass, no weight and no area.
 
-Scratch ``edge`` holds blocks of three components: warp edge forces, upper-edge forces carried to the next row, and
-the share of the weft edges (two blocks with half cells). Scratch ``node`` holds three: weft edge forces, force on
-the crossings, and heats.
+Scratch ``edge`` holds three blocks of three components: warp edge forces, upper-edge forces carried to the next row, and
+what the cells give to the weft edges on their right. Scratch ``node`` holds: weft edge forces (with the share of the
+cells on their right), force on the crossings, and rows of heats.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ import math
 import numba
 import numpy as np
 
-from weftform.mechanics.connector import connector_force
+from weftform.mechanics.connector import connector_pull
 from weftform.mechanics.membrane import SMALLEST_AREA_RATIO, shear_stress
 from weftform.mechanics.piecewise import polynomial
-from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
 from weftform.solver.vector_loops import row_loop, use_full_width
 
@@ -52,8 +51,8 @@ def sum_lanes(values, first, count):
 @row_loop
 def warp_row(
     state, row, traits, trait, count, edge, node, stride, inverse_length, viscosity, degree, pieces, law, ends
-):
-    """Warp connectors of a row, plus what the cells below carried to their upper edges; starts the nodal force.
+):  # fmt: skip
+    """Warp connectors of the last row of a band, plus what the cells below carried to their upper edges.
 
     ``viscosity`` [N s/mm3] is that of the dashpots over the squared pitch (docs/theory/dynamics.md).
     """
@@ -66,65 +65,58 @@ def warp_row(
     width, end_slope, slack = ends[0], ends[1], ends[2]
     warp = LEAD
     upper = LEAD + s + s + s + LEAD + LEAD
+    half = upper + s + s + s + LEAD + LEAD
     weft = LEAD
-    force = LEAD + s + s + s + LEAD + LEAD
-    heat = force + s + s + s + LEAD + LEAD
+    heat = half
     for i in range(count):
         dx = state[x + U1 + i] - state[x + i]
         dy = state[y + U1 + i] - state[y + i]
         dz = state[z + U1 + i] - state[z + i]
-        squared = dx * dx + dy * dy + dz * dz
-        inverse = inverse_root(squared)
-        strain = squared * inverse * inverse_length - 1.0
-        pull = connector_force(law, degree, pieces, width, end_slope, slack, strain)
-        rate = (
-            dx * (state[vx + U1 + i] - state[vx + i])
-            + dy * (state[vy + U1 + i] - state[vy + i])
-            + dz * (state[vz + U1 + i] - state[vz + i])
-        )
-        drag = viscosity * rate
-        node[heat + i] = traits[weight + i] * (drag * rate)
-        f = traits[weight + i] * (pull * inverse + drag)
+        f, hot = connector_pull(
+            dx, dy, dz,
+            state[vx + U1 + i] - state[vx + i], state[vy + U1 + i] - state[vy + i], state[vz + U1 + i] - state[vz + i],
+            inverse_length, viscosity, law, degree, pieces, width, end_slope, slack,
+        )  # fmt: skip
+        f *= traits[weight + i]
+        node[heat + i] = traits[weight + i] * hot
         edge[warp + i] = f * dx + edge[upper + i]
         edge[warp + s + i] = f * dy + edge[upper + s + i]
         edge[warp + s + s + i] = f * dz + edge[upper + s + s + i]
-        node[force + i] = -node[weft + i]
-        node[force + s + i] = -node[weft + s + i]
-        node[force + s + s + i] = -node[weft + s + s + i]
+        node[weft + i] = 0.0
+        node[weft + s + i] = 0.0
+        node[weft + s + s + i] = 0.0
+        edge[half + i] = 0.0
+        edge[half + s + i] = 0.0
+        edge[half + s + s + i] = 0.0
 
 
 @row_loop
-def cell_row(
-    state,
-    row,
-    traits,
-    trait,
-    count,
-    edge,
-    stride,
-    row_length,
-    half_cells,
-    membrane,
-    degree,
-    pieces,
-    law,
-    ends,
-    series,
-):
-    """Membrane of the cells between a row and the next: forces on their four edges.
+def fabric_row(
+    state, row, traits, trait, count, edge, node, stride, row_length, half_cells, membrane, series,
+    warp_inverse, warp_viscosity, warp_degree, warp_pieces, warp_law,
+    weft_inverse, weft_viscosity, weft_degree, weft_pieces, weft_law,
+    shear_degree, shear_pieces, shear_law, ends,
+):  # fmt: skip
+    """Warp connectors of a row, the cells and the weft connectors between it and the next.
+
+    One loop, because the three hold long chains of operations that do not wait for each other.
 
     ``membrane`` = (c11, c22, c12, E warp, E weft, hourglass, mirror signs x, y): ``c11 = 1 / (n warp pitch)^2`` and so
     on make the metric of the yarn directions out of the edge vectors, which come as the sum of two edges (n = 2), or
     with half cells as their weighted mean (n = 1). The force conjugate to ``g1`` is ``a11 g1 + a12 g2``
-    (mechanics.membrane.covariant_forces); one reciprocal serves all five quotients of a cell.
+    (mechanics.membrane.covariant_forces); one reciprocal serves four of the five quotients.
     """
     use_full_width()
     numba.literally(stride)
-    s = np.uint64(stride)
     numba.literally(row_length)
+    s = np.uint64(stride)
     step = np.uint64(row_length)
     x, y, z = row, row + s, row + s + s
+    vx, vy, vz = z + s, z + s + s, z + s + s + s
     xu, yu, zu = x + step, y + step, z + step
+    vxu, vyu, vzu = vx + step, vy + step, vz + step
+    warp_weight = trait + s * np.uint64(at.WARP_LINE)
+    weft_weight = trait + s * np.uint64(at.WEFT_LINE)
     volume = trait + s * np.uint64(at.VOLUME)
     lower_weight = trait + s * np.uint64(at.LOWER_WEIGHT)
     left_weight = trait + s * np.uint64(at.LEFT_WEIGHT)
@@ -133,12 +125,12 @@ def cell_row(
     block = s + s + s + LEAD + LEAD
     warp = LEAD
     upper = LEAD + block
-    weft = LEAD + block + block
-    right = weft + block
+    half = upper + block
+    weft = LEAD
+    heat = LEAD + block + block
     c11, c22, c12 = membrane[0], membrane[1], membrane[2]
     e1, e2 = membrane[3], membrane[4]
     stabilise = membrane[5]
-    width, end_slope = ends[0], ends[1]
     for i in range(count):
         lx = state[x + U1 + i] - state[x + i]
         ly = state[y + U1 + i] - state[y + i]
@@ -178,6 +170,8 @@ def cell_row(
         g22 = c22 * (g2x * g2x + g2y * g2y + g2z * g2z)
         g12 = c12 * (g1x * g2x + g1y * g2y + g1z * g2z)
         product = g11 * g22
+        root = math.sqrt(product)
+        area = math.sqrt(max(product - g12 * g12, SMALLEST_AREA_RATIO))
         p1 = g11 + 1.0
         p2 = g22 + 1.0
         pp = p1 * p2
@@ -187,9 +181,8 @@ def cell_row(
         y2 = (g22 - 1.0) * (p1 * by_pp)
         s1 = (e1 * y1) * polynomial(series, y1 * y1)
         s2 = (e2 * y2) * polynomial(series, y2 * y2)
-        area = math.sqrt(max(product - g12 * g12, SMALLEST_AREA_RATIO))
-        t = g12 / (math.sqrt(product) + area)
-        tau = shear_stress(law, degree, pieces, width, end_slope, t)
+        t = g12 / (root + area)
+        tau = shear_stress(shear_law, shear_degree, shear_pieces, ends[2][0], ends[2][1], t)
         vp = v * (inverse * pp)
         a12 = (c12 * v) * tau
         a11 = (c11 * vp) * g22 * (area * s1 - g12 * tau)
@@ -203,70 +196,60 @@ def cell_row(
         hx = k * (ux - lx)
         hy = k * (uy - ly)
         hz = k * (uz - lz)
+        pull, warp_heat = connector_pull(
+            lx, ly, lz,
+            state[vx + U1 + i] - state[vx + i], state[vy + U1 + i] - state[vy + i], state[vz + U1 + i] - state[vz + i],
+            warp_inverse, warp_viscosity, warp_law, warp_degree, warp_pieces, ends[0][0], ends[0][1], ends[0][2],
+        )  # fmt: skip
+        tow, weft_heat = connector_pull(
+            ax, ay, az,
+            state[vxu + i] - state[vx + i], state[vyu + i] - state[vy + i], state[vzu + i] - state[vz + i],
+            weft_inverse, weft_viscosity, weft_law, weft_degree, weft_pieces, ends[1][0], ends[1][1], ends[1][2],
+        )  # fmt: skip
+        pull *= traits[warp_weight + i]
+        tow *= traits[weft_weight + i]
+        node[heat + i] = traits[warp_weight + i] * warp_heat + traits[weft_weight + i] * weft_heat
         if half_cells:
-            edge[warp + i] += wl * px - hx
-            edge[warp + s + i] += wl * py - hy
-            edge[warp + s + s + i] += wl * pz - hz
+            edge[warp + i] = pull * lx + edge[upper + i] + (wl * px - hx)
+            edge[warp + s + i] = pull * ly + edge[upper + s + i] + (wl * py - hy)
+            edge[warp + s + s + i] = pull * lz + edge[upper + s + s + i] + (wl * pz - hz)
             edge[upper + i] = wu * px + hx
             edge[upper + s + i] = wu * py + hy
             edge[upper + s + s + i] = wu * pz + hz
-            edge[weft + i] = wa * qx
-            edge[weft + s + i] = wa * qy
-            edge[weft + s + s + i] = wa * qz
-            edge[right + i] = wb * qx
-            edge[right + s + i] = wb * qy
-            edge[right + s + s + i] = wb * qz
+            node[weft + i] = tow * ax + wa * qx
+            node[weft + s + i] = tow * ay + wa * qy
+            node[weft + s + s + i] = tow * az + wa * qz
+            edge[half + i] = wb * qx
+            edge[half + s + i] = wb * qy
+            edge[half + s + s + i] = wb * qz
         else:
-            edge[warp + i] += px - hx
-            edge[warp + s + i] += py - hy
-            edge[warp + s + s + i] += pz - hz
+            edge[warp + i] = pull * lx + edge[upper + i] + (px - hx)
+            edge[warp + s + i] = pull * ly + edge[upper + s + i] + (py - hy)
+            edge[warp + s + s + i] = pull * lz + edge[upper + s + s + i] + (pz - hz)
             edge[upper + i] = px + hx
             edge[upper + s + i] = py + hy
             edge[upper + s + s + i] = pz + hz
-            edge[weft + i] = qx
-            edge[weft + s + i] = qy
-            edge[weft + s + s + i] = qz
+            node[weft + i] = tow * ax + qx
+            node[weft + s + i] = tow * ay + qy
+            node[weft + s + s + i] = tow * az + qz
+            edge[half + i] = qx
+            edge[half + s + i] = qy
+            edge[half + s + s + i] = qz
 
 
 @row_loop
-def weft_row(
-    state, row, traits, trait, count, edge, node, stride, row_length, half_cells,
-    inverse_length, viscosity, degree, pieces, law, ends,
-):  # fmt: skip
-    """Weft connectors between a row and the next, plus the share of the cells on both sides."""
+def carry_row(count, edge, node, stride):
+    """Start the force on the crossings of a row with the weft edges below it."""
     use_full_width()
     numba.literally(stride)
     s = np.uint64(stride)
-    numba.literally(row_length)
-    step = np.uint64(row_length)
-    x, y, z = row, row + s, row + s + s
-    vx, vy, vz = z + s, z + s + s, z + s + s + s
-    weight = trait + s * np.uint64(at.WEFT_LINE)
-    width, end_slope, slack = ends[0], ends[1], ends[2]
-    block = s + s + s + LEAD + LEAD
-    left = LEAD + block + block
-    right = left + (block if half_cells else np.uint64(0)) - U1
     weft = LEAD
-    heat = LEAD + block + block
+    force = LEAD + s + s + s + LEAD + LEAD
+    half = force + s + s + s + LEAD + LEAD - U1
     for i in range(count):
-        dx = state[x + step + i] - state[x + i]
-        dy = state[y + step + i] - state[y + i]
-        dz = state[z + step + i] - state[z + i]
-        squared = dx * dx + dy * dy + dz * dz
-        inverse = inverse_root(squared)
-        strain = squared * inverse * inverse_length - 1.0
-        pull = connector_force(law, degree, pieces, width, end_slope, slack, strain)
-        rate = (
-            dx * (state[vx + step + i] - state[vx + i])
-            + dy * (state[vy + step + i] - state[vy + i])
-            + dz * (state[vz + step + i] - state[vz + i])
-        )
-        drag = viscosity * rate
-        node[heat + i] += traits[weight + i] * (drag * rate)
-        f = traits[weight + i] * (pull * inverse + drag)
-        node[weft + i] = f * dx + (edge[left + i] + edge[right + i])
-        node[weft + s + i] = f * dy + (edge[left + s + i] + edge[right + s + i])
-        node[weft + s + s + i] = f * dz + (edge[left + s + s + i] + edge[right + s + s + i])
+        node[force + i] = -(node[weft + i] + edge[half + i])
+        node[force + s + i] = -(node[weft + s + i] + edge[half + s + i])
+        node[force + s + s + i] = -(node[weft + s + s + i] + edge[half + s + s + i])
 
 
 @row_loop
@@ -277,6 +260,7 @@ def update_row(
 
     ``keep`` is what mass damping leaves of a velocity in a step, ``damping`` its heat per area of fabric and squared
     sum of the velocities before and after. Where crossings are driven their force is kept in the state.
+    Leaves the pull of the weft edges above as the first force on the next row.
     """
     use_full_width()
     numba.literally(stride)
@@ -292,11 +276,18 @@ def update_row(
     weft = LEAD
     force = LEAD + s + s + s + LEAD + LEAD
     dashpots = force + s + s + s + LEAD + LEAD
+    half = dashpots - U1
     heat = dashpots + s
     for i in range(count):
-        fx = node[force + i] + node[weft + i] + (edge[warp + i] - edge[before + i])
-        fy = node[force + s + i] + node[weft + s + i] + (edge[warp + s + i] - edge[before + s + i])
-        fz = node[force + s + s + i] + node[weft + s + s + i] + (edge[warp + s + s + i] - edge[before + s + s + i])
+        ux = node[weft + i] + edge[half + i]
+        uy = node[weft + s + i] + edge[half + s + i]
+        uz = node[weft + s + s + i] + edge[half + s + s + i]
+        fx = node[force + i] + ux + (edge[warp + i] - edge[before + i])
+        fy = node[force + s + i] + uy + (edge[warp + s + i] - edge[before + s + i])
+        fz = node[force + s + s + i] + uz + (edge[warp + s + s + i] - edge[before + s + s + i])
+        node[force + i] = -ux
+        node[force + s + i] = -uy
+        node[force + s + s + i] = -uz
         if driven:
             state[kept + i] = fx
             state[kept + s + i] = fy

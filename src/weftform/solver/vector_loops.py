@@ -32,7 +32,7 @@ def use_full_width(typingctx: Any) -> Any:
     return types.void(), codegen
 
 
-class SeparateArrays(Compiler):  # type: ignore[misc]
+class SeparateArrays(Compiler):
     """Numba's compiler, told that no two array arguments overlap.
 
     The vectoriser otherwise guards each loop with a check of every pair of arrays, and takes the scalar loop where a
@@ -43,7 +43,7 @@ class SeparateArrays(Compiler):  # type: ignore[misc]
         self, typingctx: Any, targetctx: Any, library: Any, args: Any, return_type: Any, flags: Any, locals: Any
     ) -> None:
         flags.noalias = True
-        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
+        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)  # type: ignore[no-untyped-call]
 
 
 def row_loop(function: Callable[..., Any]) -> Any:
