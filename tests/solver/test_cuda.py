@@ -99,8 +99,15 @@ def test_run_writes_the_same_result(tmp_path):
     assert (there.summary["device"], here.summary["device"]) == ("cuda", "cpu")
     assert there.summary["device_name"] == "CUDA simulator"
     assert there.summary["steps"] == here.summary["steps"] > 50
+    # forces against the largest force and so on: the punch has hardly begun to push, and its force is a rounding error of
+    # its position times the stiffness of the contact
+    largest = {}
     for name, expected in here.history.items():
-        np.testing.assert_allclose(there.history[name], expected, rtol=1e-6, atol=1e-12, err_msg=name)
+        unit = name.rsplit("_", 1)[-1]
+        largest[unit] = max(largest.get(unit, 0.0), np.abs(expected).max())
+    for name, expected in here.history.items():
+        scale = largest[name.rsplit("_", 1)[-1]]
+        np.testing.assert_allclose(there.history[name], expected, rtol=1e-6, atol=TOLERANCE * scale, err_msg=name)
 
 
 # -- no GPU ------------------------------------------------------------------------------------------------------------

@@ -154,7 +154,9 @@ class CudaDriver:
             if part == "moving":
                 self.sheet.state[:, :MOVING] = self._now.copy_to_host().reshape(self.rows, MOVING, -1)
             elif part == "kept":
-                self.sheet.state[:, MOVING:] = self._kept.copy_to_host().reshape(self.rows, kept_fields(self.layout), -1)
+                self.sheet.state[:, MOVING:] = self._kept.copy_to_host().reshape(
+                    self.rows, kept_fields(self.layout), -1
+                )
             elif part == "grip" and self.layout.tools:
                 self._grip.copy_to_host(self.machine.grip.reshape(-1))
             elif part == "heats":
@@ -239,8 +241,8 @@ class CudaDriver:
                     if motion >= 0
                     else float(machine.poses[k, P_Z])
                 )
-            for motion, kind in zip(machine.mode_motion, machine.mode_kind, strict=True):
-                value = value_of_motion(times[motion], values[motion], knots[motion], ramp, time + step)
+            for mode, kind in zip(machine.mode_motion, machine.mode_kind, strict=True):
+                value = value_of_motion(times[mode], values[mode], knots[mode], ramp, time + step)
                 row.append(math.cos(value) - 1.0 if kind == COSINE else math.sin(value) if kind == SINE else value)
             rows.append(row)
             clock[C_TIME] = time + step

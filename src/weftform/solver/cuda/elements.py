@@ -1,12 +1,13 @@
 """Forces of the elements on the device: connector, cell, contact. Tuples of three are vectors.
 
-The same equations as the row loops of the processor (:mod:`weftform.solver.rows`, ``contact_rows``), each by the scalar functions of
-:mod:`weftform.mechanics`; a thread has one element, so nothing is arranged for vector units here.
+The same equations as the row loops of the processor (:mod:`weftform.solver.rows`,
+:mod:`weftform.solver.contact_rows`), each by the scalar functions of :mod:`weftform.mechanics`; a thread has one
+element, so nothing is arranged for vector units here.
 """
 
 from __future__ import annotations
 
-from weftform.mechanics.connector import connector_force
+from weftform.mechanics.connector import connector_pull
 from weftform.mechanics.contact import coulomb, rounded_edge
 from weftform.mechanics.membrane import covariant_forces, half_tangent, log_stretch, shear_stress
 from weftform.mechanics.roots import inverse_root
@@ -15,7 +16,7 @@ from weftform.solver.cuda.functions import combine, device_function, dot, minus
 
 
 @device_function
-def connector_pull(way, rate, weight, inverse_length, viscosity, law):
+def line_force(way, rate, weight, inverse_length, viscosity, law):
     """Force along a connector and the power its dashpot takes.
 
     Parameters
@@ -33,14 +34,12 @@ def connector_pull(way, rate, weight, inverse_length, viscosity, law):
     -------
     Force on the start [N], a vector, and heat [mJ/s].
     """
-    squared = dot(way, way)
-    inverse = inverse_root(squared)
-    strain = squared * inverse * inverse_length - 1.0
-    pull = connector_force(law[0], law[1], law[2], law[3], law[4], law[5], strain)
-    stretching = dot(way, rate)
-    drag = viscosity * stretching
-    f = weight * (pull * inverse + drag)
-    return (f * way[0], f * way[1], f * way[2]), weight * drag * stretching
+    pull, heat = connector_pull(
+        way[0], way[1], way[2], rate[0], rate[1], rate[2], inverse_length, viscosity,
+        law[0], law[1], law[2], law[3], law[4], law[5],
+    )  # fmt: skip
+    f = weight * pull
+    return (f * way[0], f * way[1], f * way[2]), weight * heat
 
 
 @device_function

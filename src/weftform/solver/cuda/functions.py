@@ -3,14 +3,10 @@
 numba-cuda would take functions compiled for the processor as they are, but with the flags of the processor: it reads
 their ``fastmath={"contract"}`` as full fast-math, which breaks checks for finite numbers. So the Python function is
 compiled again, together with the functions that it calls. Under the simulator it stays a Python function.
-
-One of them is replaced: the inverse root that spares the processor's vector unit its divider. A GPU has an instruction
-that starts one.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 from types import FunctionType
@@ -20,30 +16,10 @@ import numba
 from numba import cuda
 from numba.core.dispatcher import Dispatcher
 
-from weftform.mechanics.roots import inverse_root
-
 # a small blank does not fill a GPU; the user has asked for it all the same
 numba.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # type: ignore[attr-defined]
 
 SIMULATED = bool(numba.config.ENABLE_CUDASIM)  # type: ignore[attr-defined]
-
-
-if SIMULATED:
-
-    def reciprocal_root(a):
-        """``1 / sqrt(a)``."""
-        return 1.0 / math.sqrt(a)
-
-else:
-    from numba.cuda import libdevice
-
-    def reciprocal_root(a):
-        """``1 / sqrt(a)``."""
-        return libdevice.rsqrt(a)
-
-
-REPLACED = {inverse_root: reciprocal_root}
-"""Functions of :mod:`weftform.mechanics` that are written otherwise for the device."""
 
 
 @cache
@@ -63,7 +39,6 @@ def device_function(function: Callable[..., Any]) -> Any:
 
 def _rebuilt(function: Any, convert: Callable[..., Any]) -> Callable[..., Any]:
     """A Python function whose compiled callees are converted."""
-    function = REPLACED.get(function, function)
     source = getattr(function, "py_func", function)
     called = {name: source.__globals__[name] for name in source.__code__.co_names if name in source.__globals__}
     replaced = {name: convert(value) for name, value in called.items() if isinstance(value, Dispatcher)}

@@ -174,7 +174,9 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     """Kernel: energies of each row [mJ] (for the whole density 1), into an array of shape [rows, energies.ENTRIES]."""
     stride = np.uint64(layout.stride)
     columns = constants.columns
-    moving_row, kept_row, traits_row = MOVING * layout.stride, kept_fields(layout) * layout.stride, layout.traits * layout.stride
+    moving_row, kept_row, traits_row, grip_row = (
+        fields * layout.stride for fields in (MOVING, kept_fields(layout), layout.traits, 3)
+    )
     up = np.uint64(moving_row)
     one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
@@ -184,7 +186,7 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     lower_weight, left_weight, mirror_field, mirror_z_field = (
         np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
     )
-    memory, grip_row = np.uint64((at.LEDGER - MOVING) * layout.stride), 3 * layout.stride
+    memory = np.uint64((at.LEDGER - MOVING) * layout.stride)
     half_cells, tools = bool(layout.half_cells), layout.tools
     entries = energies.ENTRIES
     kinetic, connectors, membrane_work, hourglass, contact = (

@@ -20,7 +20,7 @@ import numpy as np
 from numba import cuda
 
 from weftform.solver import layout as at
-from weftform.solver.cuda.elements import cell_forces, connector_pull, tool_traction
+from weftform.solver.cuda.elements import cell_forces, line_force, tool_traction
 from weftform.solver.cuda.functions import combine, device_function, dot, minus, put_vector, vector_at
 from weftform.solver.cuda.launch import (
     COMPILE_ONLY,
@@ -91,7 +91,9 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
     columns, rows = constants.columns, constants.rows
     wide, size, threads = tile.columns, tile.columns * tile.rows, tile.threads
     own_columns, own_rows = tile.columns - 1, tile.rows - 1
-    moving_row, kept_row, traits_row = MOVING * layout.stride, kept_fields(layout) * layout.stride, layout.traits * layout.stride
+    moving_row, kept_row, traits_row, grip_row = (
+        fields * layout.stride for fields in (MOVING, kept_fields(layout), layout.traits, 3)
+    )
     up = np.uint64(moving_row)
     one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
@@ -104,7 +106,6 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
     )
     half_cells, driven, tools = bool(layout.half_cells), bool(layout.driven), layout.tools
     force_field = np.uint64((layout.force - MOVING) * layout.stride)
-    grip_row = 3 * layout.stride
     sums = tools + layout.driven
     accumulators = SLOTS * size
     last_flag = accumulators + sums * threads
@@ -130,7 +131,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
 
     @device_function
     def compute_element(moving, traits, shared, element, m, t, viscosity):
-        """Forces of the cell and the connectors of the crossing at ``m``, its traits at ``t``, on the other three corners."""
+        """Forces of the cell and connectors of the crossing at ``m`` on the other three corners; traits are at ``t``."""
         right = (0.0, 0.0, 0.0)
         upper = (0.0, 0.0, 0.0)
         opposite = (0.0, 0.0, 0.0)
@@ -143,13 +144,13 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         if warp > 0.0:
             way = minus(vector_at(moving, m + one, stride), here)
             rate = minus(vector_at(moving, m + one + velocity, stride), pace)
-            pull, power = connector_pull(way, rate, warp, i1, viscosity * i1 * i1, warp_law)
+            pull, power = line_force(way, rate, warp, i1, viscosity * i1 * i1, warp_law)
             right = minus(right, pull)
             heat += power
         if weft > 0.0:
             way = minus(vector_at(moving, m + up, stride), here)
             rate = minus(vector_at(moving, m + up + velocity, stride), pace)
-            pull, power = connector_pull(way, rate, weft, i2, viscosity * i2 * i2, weft_law)
+            pull, power = line_force(way, rate, weft, i2, viscosity * i2 * i2, weft_law)
             upper = minus(upper, pull)
             heat += power
         if volume > 0.0:
@@ -191,7 +192,9 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         return minus(other, own)
 
     @device_function
-    def touch(grip, heats, account, area, i, row, position, pace, force, table, poses, touching, last_step, shared, thread):
+    def touch(
+        grip, heats, account, area, i, row, position, pace, force, table, poses, touching, last_step, shared, thread
+    ):  # fmt: skip
         """Add the forces of the tools that the row can touch."""
         for k in range(tools):
             stand = touching[k, row]
@@ -285,8 +288,9 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
             force = inner
             if tools > 0:
                 force = touch(
-                    grip, heats, account, area, i, j, position, pace, inner, table, poses, touching, last_step, shared, thread
-                )
+                    grip, heats, account, area, i, j, position, pace, inner, table, poses, touching, last_step, shared,
+                    thread,
+                )  # fmt: skip
             inverse = vector_at(traits, t + inverse_mass, stride)
             after = (
                 keep * pace[0] + kick * inverse[0] * force[0],
@@ -302,7 +306,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
                 if place >= 0:
                     shared[accumulators + tools * threads + thread] += drive(
                         kept, np.uint64(j * kept_row + i), m, inner, new, step, schedule, s, place, held, modes_of, state
-                    )
+                    )  # fmt: skip
         heats[0, account] += damped
 
         if sums == 0:
