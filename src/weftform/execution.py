@@ -220,8 +220,10 @@ class Run:
                 if stop in frames_at:
                     self._frame(writer)
                 if time.monotonic() - self._checkpointed > CHECKPOINT_SECONDS:
+                    writer.settle()
                     self._checkpoint(float(stop))
             self._finish(writer, "done")
+            writer.settle()
             (self.out / "checkpoint.npz").unlink(missing_ok=True)
         except KeyboardInterrupt:
             self._finish(writer, f"interrupted at {self.displacement:.2f} mm")
@@ -335,7 +337,7 @@ class Run:
             "ok": status == "done" and not warnings,
             "status": status,
             "warnings": warnings,
-            "notes": self.case.warnings(),
+            "notes": [*self.case.warnings(), *beyond_the_laws(fields)],
             "cells": grid.cell_count,
             "steps": simulation.steps,
             "wall_s": self.wall,
@@ -400,6 +402,30 @@ class Run:
                 file=path,
                 hint="resume with the same study and changes, or run anew without --resume",
             ) from None
+
+
+def beyond_the_laws(fields: Fields) -> list[str]:
+    """Which laws of the card are used beyond the range for which it gives them, where they go on straight."""
+    notes = []
+    fabric, share = fields.fabric, fields.grid.cell_share
+    here = share > 0.0
+    angle = np.abs(fields.shear_angle[here])
+    beyond = angle > fabric.shear.valid_to * (1.0 + 1e-3)
+    if beyond.any():
+        part = float(share[here][beyond].sum() / share[here].sum())
+        notes.append(
+            f"{100 * part:.3g} % of the area shears beyond {np.degrees(fabric.shear.valid_to):.3g} deg, where the shear law "
+            f"of the card ends (largest {np.degrees(angle.max()):.3g} deg): there it is continued by a straight line"
+        )
+    for name, law, strain in (("warp", fabric.warp, fields.warp_strain), ("weft", fabric.weft, fields.weft_strain)):
+        end = law.specimen_force.valid_to / law.length
+        largest = float(strain[here].max())
+        if largest > end * (1.0 + 1e-3):
+            notes.append(
+                f"the {name} is stretched by {100 * largest:.3g} %, its law in the card ends at {100 * end:.3g} %: beyond, it is "
+                "continued by a straight line"
+            )
+    return notes
 
 
 def energy_summary(rows: list[dict[str, float]]) -> dict[str, float]:

@@ -27,10 +27,7 @@ def constants_of(case):
     given = []
     found = np.zeros(survey.ENTRIES)
     found[survey.FINITE] = 1.0
-    stand_in = mock.Mock(
-        **{"survey.return_value": found, "enter_ledger.return_value": np.zeros(energies.ENTRIES)},
-        **{"kinetic_energy.return_value": 0.0},
-    )
+    stand_in = mock.Mock(**{"survey.return_value": found, "enter_ledger.return_value": np.zeros(energies.ENTRIES)})
     with mock.patch.object(driver, "CudaDriver", lambda *a: given.extend(a) or stand_in):
         Simulation(CASES[case](), device="cuda")
     _, layout, material, sheet, machine, _ = given

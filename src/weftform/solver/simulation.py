@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-SURVEY_EVERY = 64
-"""Steps between surveys of the state (stiffness, contact search)."""
-LEDGER_EVERY = 4
+SURVEY_EVERY = 128
+"""Most steps between surveys of the state (stiffness, contact search)."""
+LEDGER_EVERY = 8
 """Surveys between entries of the energy ledger."""
 CONTACT_MARGIN = 0.25
 """Share of the thickness within which a crossing always counts as touching."""
@@ -113,18 +113,11 @@ class Simulation:
         scale = max(1.0, (settings.least_step / step) ** 2)
         if scale != self.clock[loop.C_INERTIA]:
             # heavier at the same speed: the energy that this adds is booked as work
-            self._inertia_work += self._kinetic_energy() * (scale / self.clock[loop.C_INERTIA] - 1.0)
+            added = scale - self.clock[loop.C_INERTIA]
+            self._inertia_work += 0.5 * self.density * added * float(self.last[survey.KINETIC])
             self.clock[loop.C_INERTIA] = scale
             self.largest_inertia = max(self.largest_inertia, scale)
         self.clock[loop.C_STEP] = step * math.sqrt(scale)
-
-    def _kinetic_energy(self) -> float:
-        """Kinetic energy of the fabric [mJ]."""
-        if self._driver is not None:
-            return self._driver.kinetic_energy(self.density * float(self.clock[loop.C_INERTIA]))
-        speeds = np.einsum("jik,jik->ji", self.velocities, self.velocities)
-        inertia = self.sheet.trait(at.INERTIA)
-        return 0.5 * self.density * float(self.clock[loop.C_INERTIA]) * float((inertia * speeds).sum())
 
     def _choose_holder_mass(self) -> None:
         area = float(self.problem.grid.node_area.sum())
@@ -160,7 +153,10 @@ class Simulation:
                     hint="raise solver.most_steps, or use mass scaling or a shorter duration",
                 )
             # short batches at first: nothing is known yet about how fast the blank is strained
-            made = self._advance(min(SURVEY_EVERY, 8 + 4 * self._surveys), stop)
+            most = min(SURVEY_EVERY, 8 + 4 * self._surveys)
+            # up to the stop in batches of one size: a last one of a few steps costs as much around it as a long one
+            ahead = (stop - self.time) / self.step
+            made = self._advance(max(1, math.ceil(ahead / max(1.0, math.ceil(ahead / most)))), stop)
             self._surveys += 1
             self._before = self.last
             self.last = self._survey()

@@ -31,7 +31,9 @@ WORST_ROW = 6
 WORST_COLUMN = 7
 SLACKEST = 8
 """Smallest nominal strain of a connector (negative: shortened)."""
-ENTRIES = 9
+KINETIC = 9
+"""Sum over the crossings of inertia area times squared speed [mm4/s2]."""
+ENTRIES = 10
 
 CLEAR, TOUCHING, ON_FACE = 0, 1, 2
 """How a crossing stands to a tool until the next survey: out of reach, within reach, within reach of its flat face."""
@@ -43,15 +45,17 @@ LARGEST_STRAIN = 10.0
 
 
 @row_loop
-def speed_row(state, row, count, stride, fastest, broken):
-    """Largest squared speed so far in each column, and a zero that turns NaN where a number is not finite."""
+def speed_row(state, row, traits, trait, count, stride, fastest, broken, kinetic):
+    """Largest squared speed so far in each column, a zero that turns NaN where a number is not finite, and kinetic energy."""
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
+    inertia = trait + s * np.uint64(at.INERTIA)
     for i in range(count):
         u, v, w = state[vx + i], state[vy + i], state[vz + i]
         speed = u * u + v * v + w * w
         fastest[i] = max(fastest[i], speed)
+        kinetic[i] += traits[inertia + i] * speed
         broken[i] += 0.0 * (state[x + i] + state[y + i] + state[z + i] + speed)
 
 
@@ -143,6 +147,7 @@ def survey(
     length = fields * stride
     fastest = np.zeros(stride)
     broken = np.zeros(stride)
+    kinetic = np.zeros(stride)
     longest_warp = np.zeros(stride)
     longest_weft = np.zeros(stride)
     shortest = np.full(stride, np.inf)
@@ -155,8 +160,10 @@ def survey(
         count = np.uint64(spans[r, 1])
         row = np.uint64(r * length + begin)
         above = np.uint64(row_index[min(j + 1, rows - 1)] * length + begin)
-        speed_row(state, row, count, stride, fastest[begin:], broken[begin:])
         trait = np.uint64(trait_rows[r] * trait_fields * stride + begin)
+        speed_row(
+            state, row, traits, trait, count, stride, fastest[begin:], broken[begin:], kinetic[begin:]
+        )  # fmt: skip
         weight = trait + np.uint64(at.WARP_LINE * stride)
         connector_row(
             state, row, row + U1, traits, weight, count, stride, warp_inverse, longest_warp[begin:], shortest[begin:]
@@ -179,6 +186,7 @@ def survey(
     out[WEFT_STRAIN] = math.sqrt(longest_weft.max()) - 1.0
     out[SLACKEST] = math.sqrt(shortest.min()) - 1.0 if shortest.min() < math.inf else 0.0
     out[HALF_TANGENT] = sheared.max()
+    out[KINETIC] = kinetic.sum()
     out[FINITE] = 1.0
     if not (
         broken.sum() == 0.0 and out[FASTEST] < LARGEST_SPEED and longest < (1.0 + LARGEST_STRAIN) ** 2

@@ -263,8 +263,8 @@ class CudaDriver:
             self._now, self._traits, self._trait_rows, *_on_device(tools, poses), result,
         )  # fmt: skip
         found = result.copy_to_host()
-        self._inertia_sum = float(found[:, looking.R_INERTIA].sum())
         out = np.zeros(survey.ENTRIES)
+        out[survey.KINETIC] = found[:, looking.R_INERTIA].sum()
         out[survey.FINITE] = 1.0
         worst = found[:, looking.R_WORST]
         if worst.any():
@@ -289,10 +289,6 @@ class CudaDriver:
             out[survey.PENETRATION] = max(out[survey.PENETRATION], -float(gaps.min()))
         (self._touching,) = _on_device(touching)
         return out
-
-    def kinetic_energy(self, density: float) -> float:
-        """Kinetic energy of the fabric at the last survey [mJ], for a mass per area ``density`` [tonne/mm2]."""
-        return 0.5 * density * self._inertia_sum
 
     def enter_ledger(self) -> Floats:
         """What :func:`weftform.solver.energies.enter_ledger` returns."""
