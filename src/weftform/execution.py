@@ -14,6 +14,7 @@ import numpy as np
 
 from weftform.cases import Case, case_of
 from weftform.errors import DeviceError, ResultError, StudyError, UnstableRun
+from weftform.processors import crowding, usable_processors
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
@@ -106,8 +107,7 @@ def threads_for(cells: int, wanted: int | None) -> int:
 
     most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     if wanted is None:
-        available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return max(1, min(available, most, cells // CELLS_PER_THREAD))
+        return max(1, min(usable_processors(), most, cells // CELLS_PER_THREAD))
     if not 1 <= wanted <= most:
         raise StudyError(
             "that number of threads cannot be had",
@@ -187,6 +187,7 @@ class Run:
         self._last_sound = self._fields()
         self.peak_penetration = 0.0
         self.wall = 0.0
+        self._loop_s = self._processor_s = 0.0
         self._forces: list[float] = []
         self._resume = resume
         self._resumed_to = -1.0
@@ -237,10 +238,19 @@ class Run:
     def _march(self, stop: float) -> None:
         """Advance, with the clock of the time loop running: output is not counted."""
         self._started = time.perf_counter() - self.wall
+        begun, cpu = time.perf_counter(), time.process_time()
         try:
             self.simulation.advance_to(stop, self._look)
         finally:
             self.wall = time.perf_counter() - self._started
+            self._loop_s += time.perf_counter() - begun
+            self._processor_s += time.process_time() - cpu
+
+    def _waiting(self) -> list[str]:
+        """What to say where threads waited for processors; where a GPU computes, waiting is what they do."""
+        if self.simulation.device != "cpu":
+            return []
+        return crowding(self.simulation.bands, usable_processors(), self._processor_s, self._loop_s)
 
     def _warm_up(self) -> None:
         """Compile, or load from the cache, before the clock starts."""
@@ -337,7 +347,11 @@ class Run:
             "ok": status == "done" and not warnings,
             "status": status,
             "warnings": warnings,
-            "notes": [*self.case.warnings(), *beyond_the_laws(fields)],
+            "notes": [
+                *self.case.warnings(),
+                *beyond_the_laws(fields),
+                *self._waiting(),
+            ],
             "cells": grid.cell_count,
             "steps": simulation.steps,
             "wall_s": self.wall,

@@ -13,7 +13,7 @@ from weftform.mechanics.membrane import half_tangent
 from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
 from weftform.solver import layout as at
 from weftform.solver.rows import U1
-from weftform.solver.vector_loops import row_loop
+from weftform.solver.vector_loops import row_loop, use_full_width
 
 # what a survey returns
 WARP_STRAIN = 0
@@ -47,6 +47,7 @@ LARGEST_STRAIN = 10.0
 @row_loop
 def speed_row(state, row, traits, trait, count, stride, fastest, broken, kinetic):
     """Largest squared speed so far in each column, a zero that turns NaN where a number is not finite, and kinetic energy."""
+    use_full_width()
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
@@ -62,6 +63,7 @@ def speed_row(state, row, traits, trait, count, stride, fastest, broken, kinetic
 @row_loop
 def connector_row(state, row, other, traits, weight, count, stride, inverse, longest, shortest):
     """Largest and smallest squared stretch so far in each column, of the connectors from ``row`` to ``other``."""
+    use_full_width()
     s = np.uint64(stride)
     for i in range(count):
         dx = state[other + i] - state[row + i]
@@ -78,6 +80,7 @@ def shear_row(
     state, row, above, traits, trait, count, stride, weights, lower, left, warp_inverse, weft_inverse, sheared
 ):
     """Largest ``|tan(gamma / 2)|`` so far in each column, of the cells between a row and the next."""
+    use_full_width()
     s = np.uint64(stride)
     volume = trait + s * np.uint64(at.VOLUME)
     for i in range(count):
@@ -103,6 +106,7 @@ def shear_row(
 @row_loop
 def gap_row(state, row, traits, trait, count, stride, tool, tool_z, gap, inward):
     """Gap between the surface of the fabric and a tool, and the way from its rounded edge inwards on its face."""
+    use_full_width()
     s = np.uint64(stride)
     area = trait + s * np.uint64(at.AREA)
     side_s, s0, side_z, z0, radius, half_thickness = tool[0], tool[1], tool[2], tool[3], tool[4], tool[5]
