@@ -7,7 +7,9 @@ import pytest
 from weftform.processors import crowding, usable_processors
 
 
-@pytest.mark.parametrize(("text", "most"), [("100000 100000", 1), ("150000 100000", 2), ("max 100000", 10**6), ("", 10**6)])
+@pytest.mark.parametrize(
+    ("text", "most"), [("100000 100000", 1), ("150000 100000", 2), ("max 100000", 10**6), ("", 10**6)]
+)
 def test_the_quota_of_a_container_counts(tmp_path, text, most):
     (tmp_path / "cpu.max").write_text(text)
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
