@@ -14,7 +14,7 @@ from weftform.mechanics.stable_step import stable_step
 from weftform.study import Study
 from weftform.study.schema import FormingModel
 
-NS_PER_CELL_STEP = 45.0
+NS_PER_CELL_STEP = 30.0
 """Of one thread with three tools on a laptop of 2023; `weftform doctor` measures this machine."""
 
 WORKING_FORCE = 1.5

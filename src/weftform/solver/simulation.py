@@ -382,6 +382,7 @@ class Simulation:
         tools = self.machine.poses
         mass = self.machine.tools[:, loop.T_MASS]
         tangential = self.machine.tools[:, loop.T_TANGENTIAL] * self.machine.tools[:, loop.T_STIFFNESS]
+        heats = self.machine.heats[self.sheet.row_index].sum(axis=0)  # in the order of the grid, whatever the bands
         return Ledger(
             kinetic=float(
                 self.clock[loop.C_INERTIA] * entry[energies.KINETIC]
@@ -391,7 +392,7 @@ class Simulation:
             membrane=float(entry[energies.MEMBRANE]),
             hourglass=float(entry[energies.HOURGLASS]),
             contact=float(entry[energies.CONTACT]),
-            friction=float((self.machine.heats[:, 1:].sum(axis=0) / tangential).sum()),
-            damping=float(self.machine.heats[:, 0].sum() + tools[:, loop.P_DAMPED].sum()),
+            friction=float((heats[1:] / tangential).sum()),
+            damping=float(heats[0] + tools[:, loop.P_DAMPED].sum()),
             work=float(tools[:, loop.P_WORK].sum() + self.clock[loop.C_DRIVE_WORK]) + self._inertia_work,
         )
