@@ -1,0 +1,110 @@
+"""The sheet that is timed: the shipped hemisphere on a whole blank, in the middle of its stroke."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from weftform.cases import case_of
+from weftform.solver import Problem, Simulation, loop
+from weftform.solver import layout as at
+from weftform.study import Study
+
+Floats = NDArray[np.float64]
+
+STUDY = "hemisphere-0-90"
+SIDE_MM = 150.0
+SOURCE_CELLS = 56
+"""Cells along a side of the blank that is formed; finer and coarser sheets take over its shape."""
+PART_OF_STROKE = 0.6
+"""How far the stroke is when the clock starts: crossings on the dome, on the fillet and under the holder, some sticking, some slipping."""
+PART_OF_SHAPE = 0.05
+"""Share of the shape that a sheet without tools starts from: a formed blank let go at once would whip about."""
+SETTLING = 512
+"""Steps after a shape has been taken over, so that contact and friction belong to the sheet itself."""
+
+
+def sheet_study(cells: int) -> Study:
+    """The study on a whole blank with ``cells`` cells along a side."""
+    return Study.load(STUDY, {"blank.symmetry": "full", "blank.cell_length_mm": SIDE_MM / cells})
+
+
+def sheet_problem(cells: int, contact: bool) -> Problem:
+    """What is advanced; without contact the same sheet with the tools taken away."""
+    problem = case_of(sheet_study(cells)).problem()
+    return problem if contact else replace(problem, tools=(), motions=(), stroke=-1, holding=-1)
+
+
+@cache
+def formed_source(cells: int = SOURCE_CELLS, part: float = PART_OF_STROKE) -> Simulation:
+    """The blank formed from flat to ``part`` of the stroke."""
+    study = sheet_study(cells)
+    case = case_of(study)
+    simulation = Simulation(case.problem())
+    simulation.advance_to(case.begin + part * (case.end - case.begin))
+    return simulation
+
+
+def formed_sheet(cells: int, contact: bool, threads: int = 1, source: Simulation | None = None) -> Simulation:
+    """A sheet in the middle of its stroke.
+
+    Parameters
+    ----------
+    cells
+        Along a side.
+    contact
+        With the three tools; without, the formed sheet springs back freely.
+    threads
+        Bands of rows.
+    source
+        The formed blank whose shape, speed, friction and clock are taken over; :func:`formed_source` without.
+
+    Returns
+    -------
+    A simulation that has made at least :data:`SETTLING` steps of its own.
+    """
+    source = source or formed_source()
+    simulation = Simulation(sheet_problem(cells, contact), threads)
+    taken, saved = source.checkpoint(), simulation.checkpoint()
+    rows, columns = simulation.rows, simulation.columns
+    groups = [(at.POSITION, at.POSITION, 6)]
+    if contact:
+        groups += [
+            (source.layout.tool + k * at.TOOL_FIELDS, simulation.layout.tool + k * at.TOOL_FIELDS, 3)
+            for k in range(simulation.layout.tools)
+        ]
+        for name in ("poses", "tools"):
+            saved[name] = taken[name]
+    for first, here, count in groups:
+        # forces of crossings go with the area they stand for
+        share = 1.0 if first == at.POSITION else (source.rows - 1) * (source.columns - 1) / ((rows - 1) * (columns - 1))
+        for k in range(count):
+            field = taken["fields"][:, first + k, : source.columns]
+            found = share * _on_grid(field, rows, columns)
+            if not contact:
+                flat = saved["fields"][:, here + k, :columns]
+                found = flat + PART_OF_SHAPE * (found - flat)
+            saved["fields"][:, here + k, :columns] = found
+    saved["clock"][loop.C_TIME] = taken["clock"][loop.C_TIME]
+    # cautious until a survey has seen how taut the yarns are
+    saved["clock"][[loop.C_STEP, loop.C_LAST_STEP]] = 0.1 * min(simulation.step, source.step)
+    simulation.restore(saved)
+    settled = simulation.steps + SETTLING
+    while simulation.steps < settled:
+        simulation.advance_to(simulation.time + 64 * simulation.step)
+    return simulation
+
+
+def _on_grid(field: Floats, rows: int, columns: int) -> Floats:
+    """A field of crossings on a grid with other numbers of rows and columns, by bicubic splines."""
+    if field.shape == (rows, columns):
+        return field
+    from scipy.interpolate import RectBivariateSpline
+
+    along = [np.linspace(0.0, 1.0, n) for n in field.shape]
+    spline = RectBivariateSpline(*along, field)
+    found: Floats = spline(np.linspace(0.0, 1.0, rows), np.linspace(0.0, 1.0, columns))
+    return found
