@@ -24,6 +24,8 @@ FLAGS = (
     "-fopenmp-simd",
     "-fno-math-errno",
     "-fno-trapping-math",
+    "-ffinite-math-only",
+    "-fno-signed-zeros",
     "-ffp-contract=fast",
     "-mprefer-vector-width=512",
 )
@@ -155,6 +157,14 @@ class Reference:
             ramp=settings.ramp, time=clock[loop.C_TIME], step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP], inertia_factor=clock[loop.C_INERTIA],
         )  # fmt: skip
         self.survey()
+        self._start = [(a, a.copy()) for a in (self.state, self._tool_table, self._poses, self._touching)]
+        self._start_time = self._sheet.time
+
+    def restart(self) -> None:
+        """Back to where it began."""
+        for array, start in self._start:
+            array[:] = start
+        self._sheet.time = self._start_time
 
     def _profile(self, field: Floats) -> Floats:
         """First row and second row of a field that is the same on all rows but the first and last, padded."""
@@ -163,7 +173,7 @@ class Reference:
         return out
 
     def _address(self, array: NDArray[Any]) -> int:
-        array = np.ascontiguousarray(array)
+        assert array.flags.c_contiguous
         self._kept.append(array)
         return array.ctypes.data
 
