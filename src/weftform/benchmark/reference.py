@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from weftform.errors import WeftformError
 from weftform.solver import Simulation, loop
 from weftform.solver import layout as at
-from weftform.solver.simulation import SURVEY_EVERY
+from weftform.solver.simulation import CONTACT_MARGIN, SURVEY_EVERY
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +33,7 @@ FLAGS = (
 TOOLS = 3
 
 
-class ReferenceError(Exception):
+class ReferenceMissing(WeftformError):
     """The reference cannot be built here; the message says why."""
 
 
@@ -42,7 +43,7 @@ def source_file() -> Path:
     for file in (here.with_name("sheet.c"), here.parents[3] / "benchmarks" / "reference" / "sheet.c"):
         if file.exists():
             return file
-    raise ReferenceError("the C source of the reference is missing from this installation")
+    raise ReferenceMissing("the C source of the reference is missing from this installation")
 
 
 class _Sheet(ctypes.Structure):
@@ -88,7 +89,7 @@ class Reference:
 
     Raises
     ------
-    ReferenceError
+    ReferenceMissing
         No compiler, or a problem that the reference does not know.
     """
 
@@ -96,16 +97,16 @@ class Reference:
         layout, grid = simulation.layout, simulation.problem.grid
         warp, weft, shear = simulation._packed
         if layout.half_cells or layout.driven or layout.tools not in (0, TOOLS) or not grid.active.all():
-            raise ReferenceError("the reference knows whole rectangular blanks with three tools or none")
+            raise ReferenceMissing("the reference knows whole rectangular blanks with three tools or none")
         if warp.pieces * weft.pieces * shear.pieces != 1:
-            raise ReferenceError("the reference knows laws of one polynomial")
+            raise ReferenceMissing("the reference knows laws of one polynomial")
         self.rows, self.columns = simulation.rows, simulation.columns
         self.cells = (self.rows - 1) * (self.columns - 1)
         self.stride = -(-(self.columns + 1) // 8) * 8 + 8
         if self.stride % 64 == 0:
             self.stride += 8
         self.tools = layout.tools
-        self._margin = 0.25 * simulation.problem.fabric.thickness
+        self._margin = CONTACT_MARGIN * simulation.problem.fabric.thickness
         saved = simulation.checkpoint()
         self._library = _compile(
             flags,
@@ -154,7 +155,8 @@ class Reference:
             tools=self._address(self._tool_table), poses=self._address(self._poses), touching=self._address(self._touching),
             times=self._address(simulation._motion_times), values=self._address(simulation._motion_values),
             knots=self._address(simulation._motion_knots), most_knots=simulation._motion_times.shape[1],
-            ramp=settings.ramp, time=clock[loop.C_TIME], step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP], inertia_factor=clock[loop.C_INERTIA],
+            ramp=settings.ramp, time=clock[loop.C_TIME], step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP],
+            inertia_factor=clock[loop.C_INERTIA],
         )  # fmt: skip
         self.survey()
         self._start = [(a, a.copy()) for a in (self.state, self._tool_table, self._poses, self._touching)]
@@ -211,11 +213,22 @@ class Reference:
         """Heat of damping since the start [mJ]."""
         return float(self._sheet.damped)
 
+    @property
+    def friction(self) -> float:
+        """Heat of friction of all tools since the start [mJ]."""
+        shares = (self._tool_table[k, [loop.T_STIFFNESS, loop.T_TANGENTIAL]].prod() for k in range(self.tools))
+        return float(sum(slipped / share for slipped, share in zip(self._sheet.slipped, shares, strict=False)))
+
+    @property
+    def reactions(self) -> Floats:
+        """Axial force of each tool [N]."""
+        return self._poses[:, loop.P_REACTION]
+
 
 def _compile(flags: tuple[str, ...], **macros: int) -> ctypes.CDLL:
     compiler = shutil.which("gcc")
     if compiler is None:
-        raise ReferenceError("no gcc on this machine (Debian: apt-get install gcc)")
+        raise ReferenceMissing("no gcc on this machine (Debian: apt-get install gcc)")
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "sheet.so"
         done = subprocess.run(
@@ -224,5 +237,5 @@ def _compile(flags: tuple[str, ...], **macros: int) -> ctypes.CDLL:
             capture_output=True, text=True, check=False,
         )  # fmt: skip
         if done.returncode:
-            raise ReferenceError(f"gcc failed: {done.stderr.strip()[-500:]}")
+            raise ReferenceMissing(f"gcc failed: {done.stderr.strip()[-500:]}")
         return ctypes.CDLL(str(library))

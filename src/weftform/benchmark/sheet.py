@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -20,7 +21,7 @@ SIDE_MM = 150.0
 SOURCE_CELLS = 56
 """Cells along a side of the blank that is formed; finer and coarser sheets take over its shape."""
 PART_OF_STROKE = 0.6
-"""How far the stroke is when the clock starts: crossings on the dome, on the fillet and under the holder, some sticking, some slipping."""
+"""How far the stroke is when the clock starts: crossings on dome, fillet and holder, some sticking, some slipping."""
 PART_OF_SHAPE = 0.05
 """Share of the shape that a sheet without tools starts from: a formed blank let go at once would whip about."""
 SETTLING = 512
@@ -48,7 +49,13 @@ def formed_source(cells: int = SOURCE_CELLS, part: float = PART_OF_STROKE) -> Si
     return simulation
 
 
-def formed_sheet(cells: int, contact: bool, threads: int = 1, source: Simulation | None = None) -> Simulation:
+MAKERS: dict[str, Callable[[Problem, int], Simulation]] = {"cpu": Simulation}
+"""What advances a problem on each device. Another device adds itself here; it has to restore checkpoints."""
+
+
+def formed_sheet(
+    cells: int, contact: bool, threads: int = 1, device: str = "cpu", source: Simulation | None = None
+) -> Simulation:
     """A sheet in the middle of its stroke.
 
     Parameters
@@ -59,6 +66,8 @@ def formed_sheet(cells: int, contact: bool, threads: int = 1, source: Simulation
         With the three tools; without, the formed sheet springs back freely.
     threads
         Bands of rows.
+    device
+        One of :data:`MAKERS`.
     source
         The formed blank whose shape, speed, friction and clock are taken over; :func:`formed_source` without.
 
@@ -67,7 +76,7 @@ def formed_sheet(cells: int, contact: bool, threads: int = 1, source: Simulation
     A simulation that has made at least :data:`SETTLING` steps of its own.
     """
     source = source or formed_source()
-    simulation = Simulation(sheet_problem(cells, contact), threads)
+    simulation = MAKERS[device](sheet_problem(cells, contact), threads)
     taken, saved = source.checkpoint(), simulation.checkpoint()
     rows, columns = simulation.rows, simulation.columns
     groups = [(at.POSITION, at.POSITION, 6)]

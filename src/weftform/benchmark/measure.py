@@ -1,0 +1,160 @@
+"""Timing of sheets: laps of all cases in turn, so that a slow spell of the machine hits all of them."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from weftform.benchmark.reference import Reference
+from weftform.benchmark.sheet import formed_sheet, sheet_study
+from weftform.result.fields import Fields
+from weftform.solver import Simulation
+from weftform.solver import layout as at
+from weftform.solver.layout import Layout
+
+LAP_STEPS = 256
+"""Steps of a lap: four surveys, one entry of the ledger and one row of the history, as in a run of the shipped study."""
+C_LAP_STEPS = 64
+"""Steps of a lap of the C program: one survey."""
+
+WEFTFORM = "weftform"
+C_REFERENCE = "c-reference"
+C_EVERYWHERE = "c-reference, contact on all rows"
+
+
+@dataclass
+class Timed:
+    """One case and its laps.
+
+    Attributes
+    ----------
+    program
+        :data:`WEFTFORM`, :data:`C_REFERENCE` or :data:`C_EVERYWHERE`.
+    side
+        Cells along a side of the sheet.
+    lap
+        Makes one lap; returns steps, seconds of everything, seconds of the time loop alone.
+    memory
+        Bytes of state per cell.
+    """
+
+    program: str
+    side: int
+    threads: int
+    contact: bool
+    device: str
+    lap: Callable[[], tuple[int, float, float]]
+    memory: float
+    work: dict[str, float]
+    laps: list[tuple[float, float]] = field(default_factory=list)
+    """Of each lap: ns per cell per step of everything, and of the time loop alone."""
+
+    @property
+    def cells(self) -> int:
+        return self.side**2
+
+    def run(self) -> None:
+        """Make a lap."""
+        steps, whole, loop = self.lap()
+        scale = 1e9 / (steps * self.cells)
+        self.laps.append((whole * scale, loop * scale))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The case as ``weftform bench --json`` prints it."""
+        whole = [lap[0] for lap in self.laps]
+        best = min(whole)
+        return {
+            "program": self.program,
+            "cells": self.cells,
+            "threads": self.threads,
+            "contact": self.contact,
+            "precision": "float64",
+            "device": self.device,
+            "ns_per_cell_step": round(best, 3),
+            "loop_ns_per_cell_step": round(min(lap[1] for lap in self.laps), 3),
+            "median_ns_per_cell_step": round(statistics.median(whole), 3),
+            "laps": len(self.laps),
+            "state_bytes_per_cell": round(self.memory, 1),
+            **{name: round(value, 1) for name, value in self.work.items()},
+            "gflops": round(self.work["flops_per_cell_step"] / best, 2),
+        }
+
+
+def arithmetic(layout: Layout, touched: float) -> dict[str, float]:
+    """Operations and memory traffic of one cell in one step, for the roofline.
+
+    Counted by hand in the formulas of ``mechanics``: an addition, multiplication, division or root is one, a
+    comparison none. ``touched`` is the mean number of tools evaluated on a crossing. Bytes are those of a sheet far
+    larger than the caches: what a sweep reads, and what it writes back.
+    """
+    connectors = 2.0 * 32.0 + 2.0 * (layout.warp_degree + layout.weft_degree)
+    cell = 176.0 + 2.0 * layout.shear_degree
+    crossing = 38.0
+    tool = 62.0
+    written = 7 + touched * at.TOOL_FIELDS
+    read = at.LEDGER + touched * at.TOOL_FIELDS
+    return {
+        "flops_per_cell_step": connectors + cell + crossing + tool * touched,
+        "bytes_per_cell_step": 8.0 * (written + read),
+    }
+
+
+def weftform_case(side: int, threads: int, contact: bool, device: str, source: Simulation | None) -> Timed:
+    """A sheet advanced by the package, as users run it: surveys, ledger and history included."""
+    simulation = formed_sheet(side, contact, threads, device, source)
+    study = sheet_study(side)
+    start = simulation.checkpoint()
+
+    def lap() -> tuple[int, float, float]:
+        simulation.restore(start)
+        before = simulation.steps
+        began = time.perf_counter()
+        while simulation.steps - before < LAP_STEPS:
+            simulation.advance_to(simulation.time + (LAP_STEPS - simulation.steps + before) * simulation.step)
+        looped = time.perf_counter()
+        simulation.ledger()
+        Fields(study.grid, study.fabric, simulation.positions).largest_shear()
+        return simulation.steps - before, time.perf_counter() - began, looped - began
+
+    fields = start["fields"]
+    touched = float((simulation._touching > 0).mean(axis=1).sum())
+    work = arithmetic(simulation.layout, touched)
+    return Timed(WEFTFORM, side, threads, contact, device, lap, fields.nbytes / side**2, work)
+
+
+def reference_case(simulation: Simulation, side: int, contact: bool, everywhere: bool = False) -> Timed:
+    """The same sheet advanced by the C program: steps and surveys."""
+    reference = Reference(simulation, everywhere)
+
+    def lap() -> tuple[int, float, float]:
+        reference.restart()
+        began = time.perf_counter()
+        reference.advance_surveyed(C_LAP_STEPS)
+        spent = time.perf_counter() - began
+        return C_LAP_STEPS, spent, spent
+
+    touched = 3.0 if everywhere else float((simulation._touching > 0).mean(axis=1).sum())
+    work = arithmetic(simulation.layout, touched)
+    name = C_EVERYWHERE if everywhere else C_REFERENCE
+    return Timed(name, side, 1, contact, "cpu", lap, reference.state.nbytes / side**2, work)
+
+
+def take_laps(
+    cases: Iterable[Timed], seconds: float, fewest: int, watch: Callable[[float], None] | None = None
+) -> None:
+    """Run laps of all cases in turn until ``seconds`` are spent and each has ``fewest``."""
+    cases = list(cases)
+    for case in cases:
+        case.run()  # warm caches, start threads
+        case.laps.clear()
+    began = time.perf_counter()
+    rounds = 0
+    while rounds < fewest or time.perf_counter() - began < seconds:
+        for case in cases:
+            case.run()
+        rounds += 1
+        if watch is not None:
+            watch(min(1.0, (time.perf_counter() - began) / max(seconds, 1e-9)))
