@@ -1,7 +1,8 @@
 """The sheet as cloth in Newton on Warp's processor backend, semi-implicit solver; run with the Python that has newton.
 
 Has: triangles of a Neo-Hookean membrane, springs along the edges, damping, penalty contact with one sphere (with contact).
-Lacks: axial law of the yarns, die, blank-holder, energy ledger. Warp's processor backend computes in single precision on one thread.
+Lacks: axial law of the yarns, die, blank-holder, energy ledger. Warp's processor backend: single precision,
+one thread.
 
 usage: python newton_sheet.py CELLS CONTACT(0|1) STEPS
 """

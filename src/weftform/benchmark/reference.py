@@ -6,6 +6,7 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -223,6 +224,22 @@ class Reference:
     def reactions(self) -> Floats:
         """Axial force of each tool [N]."""
         return self._poses[:, loop.P_REACTION]
+
+
+def multiply_add() -> Callable[[Floats, int], None]:
+    """Multiply-adds in C on 512 numbers, 16 on each per repeat.
+
+    Raises
+    ------
+    ReferenceMissing
+        No compiler.
+    """
+    library = _compile(FLAGS, STRIDE=16, TOOLS=0, WARP_DEGREE=1, WEFT_DEGREE=1, SHEAR_DEGREE=1, SERIES=2, RESTRICT=0)
+
+    def work(values: Floats, repeats: int) -> None:
+        library.multiply_add(values.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(repeats))
+
+    return work
 
 
 def _compile(flags: tuple[str, ...], **macros: int) -> ctypes.CDLL:
