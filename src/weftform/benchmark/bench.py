@@ -23,6 +23,9 @@ FEWEST_LAPS = 3
 WIDE_SPREAD = 1.15
 """Median over minimum of the laps beyond which the machine is called noisy."""
 
+BUSY = 0.9
+"""Share of the processor below which others are using it."""
+
 Watch = Callable[[str, float], None]
 
 
@@ -136,8 +139,13 @@ def _noise(cases: list[dict[str, Any]], numbers: list[int]) -> list[str]:
         notes.append(
             f"a noisy machine: half of the laps took {100 * (spread - 1):.0f} % longer than the fastest; the least is given"
         )
+    alone = [case["processor_share"] for case in cases if case["threads"] == 1 and case["device"] == "cpu"]
+    share = statistics.median(alone) if alone else 1.0
+    if share < BUSY:
+        notes.append(
+            f"other programs took {100 * (1 - share):.0f} % of the processor of the laps on one thread: "
+            "times on more threads mean little"
+        )
     if max(numbers) > processors():
         notes.append(f"{max(numbers)} threads on {processors()} processors wait for each other")
-    elif hasattr(os, "getloadavg") and os.getloadavg()[0] > max(numbers) + 0.5:
-        notes.append(f"other programs are running (load {os.getloadavg()[0]:.1f}): threads wait for each other")
     return notes

@@ -51,6 +51,8 @@ class Timed:
     work: dict[str, float]
     laps: list[tuple[float, float]] = field(default_factory=list)
     """Of each lap: ns per cell per step of everything, and of the time loop alone."""
+    shares: list[float] = field(default_factory=list)
+    """Of each lap: processor time over wall time times threads; below one where others use the processors."""
 
     @property
     def cells(self) -> int:
@@ -58,7 +60,9 @@ class Timed:
 
     def run(self) -> None:
         """Make a lap."""
+        wall, processor = time.perf_counter(), time.process_time()
         steps, whole, loop = self.lap()
+        self.shares.append((time.process_time() - processor) / ((time.perf_counter() - wall) * self.threads))
         scale = 1e9 / (steps * self.cells)
         self.laps.append((whole * scale, loop * scale))
 
@@ -77,6 +81,7 @@ class Timed:
             "loop_ns_per_cell_step": round(min(lap[1] for lap in self.laps), 3),
             "median_ns_per_cell_step": round(statistics.median(whole), 3),
             "laps": len(self.laps),
+            "processor_share": round(statistics.median(self.shares), 3),
             "state_bytes_per_cell": round(self.memory, 1),
             **{name: round(value, 1) for name, value in self.work.items()},
             "gflops": round(self.work["flops_per_cell_step"] / best, 2),
