@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -245,12 +246,16 @@ def multiply_add() -> Callable[[Floats, int], None]:
 def _compile(flags: tuple[str, ...], **macros: int) -> ctypes.CDLL:
     compiler = shutil.which("gcc")
     if compiler is None:
-        raise ReferenceMissing("no gcc on this machine (Debian: apt-get install gcc)")
+        raise ReferenceMissing("no gcc on this machine", hint="Debian: apt-get install gcc")
+    return _library((compiler, *flags, *(f"-D{name}={value}" for name, value in macros.items())))
+
+
+@cache
+def _library(command: tuple[str, ...]) -> ctypes.CDLL:
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "sheet.so"
         done = subprocess.run(
-            [compiler, *flags, *(f"-D{name}={value}" for name, value in macros.items()), "-shared", "-fPIC",
-             "-o", str(library), str(source_file()), "-lm"],
+            [*command, "-shared", "-fPIC", "-o", str(library), str(source_file()), "-lm"],
             capture_output=True, text=True, check=False,
         )  # fmt: skip
         if done.returncode:
