@@ -10,13 +10,14 @@ from typing import Any
 
 from weftform.benchmark.reference import Reference
 from weftform.benchmark.sheet import formed_sheet, sheet_study
+from weftform.cases import case_of
 from weftform.result.fields import Fields
 from weftform.solver import Simulation
 from weftform.solver import layout as at
 from weftform.solver.layout import Layout
 
 LAP_STEPS = 256
-"""Steps of a lap: four surveys, one entry of the ledger and one row of the history, as in a run of the shipped study."""
+"""Steps of a lap: four surveys and one entry of the ledger; a row of the history is added as often as the study asks."""
 C_LAP_STEPS = 64
 """Steps of a lap of the C program: one survey."""
 
@@ -112,6 +113,8 @@ def weftform_case(side: int, threads: int, contact: bool, device: str, source: S
     simulation = formed_sheet(side, contact, threads, device, source)
     study = sheet_study(side)
     start = simulation.checkpoint()
+    case = case_of(study)
+    between_rows = case.end / (study.model.output.rows - 1)
 
     def lap() -> tuple[int, float, float]:
         simulation.restore(start)
@@ -122,7 +125,9 @@ def weftform_case(side: int, threads: int, contact: bool, device: str, source: S
         looped = time.perf_counter()
         simulation.ledger()
         Fields(study.grid, study.fabric, simulation.positions).largest_shear()
-        return simulation.steps - before, time.perf_counter() - began, looped - began
+        row = time.perf_counter() - looped
+        made = simulation.steps - before
+        return made, looped - began + row * made * simulation.step / between_rows, looped - began
 
     fields = start["fields"]
     touched = float((simulation._touching > 0).mean(axis=1).sum())

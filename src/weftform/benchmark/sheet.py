@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from weftform.cases import case_of
+from weftform.mechanics.compiled import FASTMATH
+from weftform.mechanics.contact import rounded_edge
 from weftform.solver import Problem, Simulation, loop
 from weftform.solver import layout as at
 from weftform.study import Study
@@ -22,15 +27,20 @@ SOURCE_CELLS = 56
 """Cells along a side of the blank that is formed; finer and coarser sheets take over its shape."""
 PART_OF_STROKE = 0.6
 """How far the stroke is when the clock starts: crossings on dome, fillet and holder, some sticking, some slipping."""
-PART_OF_SHAPE = 0.05
+PART_OF_SHAPE = 0.002
 """Share of the shape that a sheet without tools starts from: a formed blank let go at once would whip about."""
+MOST_PENETRATION_MM = 2.0e-3
+PUSHES = 3
 SETTLING = 512
 """Steps after a shape has been taken over, so that contact and friction belong to the sheet itself."""
 
 
 def sheet_study(cells: int) -> Study:
-    """The study on a whole blank with ``cells`` cells along a side."""
-    return Study.load(STUDY, {"blank.symmetry": "full", "blank.cell_length_mm": SIDE_MM / cells})
+    """The study on a whole blank with ``cells`` cells along a side; the least step goes with the length of a cell."""
+    least = Study.load(STUDY).model.solver.least_step_s * min(1.0, SOURCE_CELLS / cells)
+    return Study.load(
+        STUDY, {"blank.symmetry": "full", "blank.cell_length_mm": SIDE_MM / cells, "solver.least_step_s": least}
+    )
 
 
 def sheet_problem(cells: int, contact: bool) -> Problem:
@@ -97,6 +107,10 @@ def formed_sheet(
                 flat = saved["fields"][:, here + k, :columns]
                 found = flat + PART_OF_SHAPE * (found - flat)
             saved["fields"][:, here + k, :columns] = found
+    if contact:
+        # what the cells of the source cut off at fillets would be thrown out by the finer sheet's contact
+        for _ in range(PUSHES):
+            _push_out(saved["fields"], columns, saved["tools"], saved["poses"], MOST_PENETRATION_MM)
     saved["clock"][loop.C_TIME] = taken["clock"][loop.C_TIME]
     # cautious until a survey has seen how taut the yarns are
     saved["clock"][[loop.C_STEP, loop.C_LAST_STEP]] = 0.1 * min(simulation.step, source.step)
@@ -105,6 +119,24 @@ def formed_sheet(
     while simulation.steps < settled:
         simulation.advance_to(simulation.time + 64 * simulation.step)
     return simulation
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True)
+def _push_out(fields: Any, columns: int, tools: Any, poses: Any, allowed: float) -> None:
+    """Move crossings that are deeper in a tool than ``allowed`` to its surface."""
+    for j in range(fields.shape[0]):
+        for i in range(columns):
+            for k in range(tools.shape[0]):
+                t = tools[k]
+                x, y, z = fields[j, 0, i], fields[j, 1, i], fields[j, 2, i]
+                away = math.sqrt(x * x + y * y)
+                distance, normal_s, normal_z = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
+                gap = distance - t[5]
+                if gap < -allowed:
+                    radial = normal_s / max(away, 1e-12)
+                    fields[j, 0, i] -= gap * x * radial
+                    fields[j, 1, i] -= gap * y * radial
+                    fields[j, 2, i] -= gap * normal_z
 
 
 def _on_grid(field: Floats, rows: int, columns: int) -> Floats:
