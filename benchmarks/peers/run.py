@@ -20,7 +20,7 @@ from pathlib import Path
 import lammps_sheet
 
 from weftform.benchmark.measure import weftform_case
-from weftform.benchmark.sheet import formed_source
+from weftform.benchmark.sheet import formed_sheet, formed_source
 
 CELLS = 56
 HERE = Path(__file__).resolve().parent
@@ -66,7 +66,10 @@ def main() -> None:
     arguments.add_argument("--rounds", type=int, default=3)
     options = arguments.parse_args()
     source = formed_source()
-    ours = {contact: weftform_case(CELLS, 1, contact, "cpu", source) for contact in (True, False)}
+    ours = {
+        contact: weftform_case(formed_sheet(CELLS, contact, source), CELLS, 1, contact, "cpu")
+        for contact in (True, False)
+    }
     found: dict[tuple[str, bool], list[float]] = {}
     missing: dict[tuple[str, bool], str] = {}
     for turn in range(options.rounds):

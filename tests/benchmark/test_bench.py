@@ -23,7 +23,7 @@ def test_json_has_machine_and_cases(found):
     assert all(set(case) >= KEYS for case in read["cases"])
     ours = [case for case in read["cases"] if case["program"] == "weftform"]
     assert {case["contact"] for case in ours} == {True, False}
-    assert all(case["cells"] == 144 and case["threads"] == 1 and case["laps"] == 2 for case in ours)
+    assert all(case["cells"] == 144 and case["threads"] == 1 and case["laps"] >= 2 for case in ours)
 
 
 def test_least_is_least_and_the_loop_is_part_of_the_whole(found):

@@ -7,7 +7,7 @@ import pytest
 
 from weftform.benchmark import bench as whole
 from weftform.benchmark.reference import Reference, source_file
-from weftform.benchmark.sheet import MAKERS, formed_sheet, formed_source
+from weftform.benchmark.sheet import MAKERS, formed_sheet, formed_source, same_sheet
 from weftform.errors import WeftformError
 from weftform.solver import energies, loop
 
@@ -79,6 +79,10 @@ def test_a_device_is_added_by_one_entry(monkeypatch, source):
         return MAKERS["cpu"](problem, threads)
 
     monkeypatch.setitem(MAKERS, "twin", maker)
-    twin = formed_sheet(SIDE, True, device="twin", source=source)
+    sheet = formed_sheet(SIDE, True, source)
+    twin = same_sheet(sheet, 1, "twin")
     assert made == [1]
-    assert np.array_equal(twin.positions, formed_sheet(SIDE, True, source=source).positions)
+    stop = sheet.time + 10 * sheet.step
+    for simulation in (sheet, twin):
+        simulation.advance_to(stop)
+    assert np.array_equal(twin.positions, sheet.positions)

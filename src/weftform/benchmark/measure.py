@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from weftform.benchmark.reference import Reference
-from weftform.benchmark.sheet import formed_sheet, sheet_study
+from weftform.benchmark.sheet import same_sheet, sheet_study
 from weftform.cases import case_of
 from weftform.result.fields import Fields
 from weftform.solver import Simulation
@@ -20,6 +20,9 @@ LAP_STEPS = 256
 """Steps of a lap: four surveys and one entry of the ledger; a row of the history is added as often as the study asks."""
 C_LAP_STEPS = 64
 """Steps of a lap of the C program: one survey."""
+
+TURN_SECONDS = 0.25
+"""A case keeps its turn for as long as this."""
 
 WEFTFORM = "weftform"
 C_REFERENCE = "c-reference"
@@ -108,9 +111,9 @@ def arithmetic(layout: Layout, touched: float) -> dict[str, float]:
     }
 
 
-def weftform_case(side: int, threads: int, contact: bool, device: str, source: Simulation | None) -> Timed:
+def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, device: str) -> Timed:
     """A sheet advanced by the package, as users run it: surveys, ledger and history included."""
-    simulation = formed_sheet(side, contact, threads, device, source)
+    simulation = same_sheet(sheet, threads, device)
     study = sheet_study(side)
     start = simulation.checkpoint()
     case = case_of(study)
@@ -157,14 +160,15 @@ def take_laps(
 ) -> None:
     """Run laps of all cases in turn until ``seconds`` are spent and each has ``fewest``."""
     cases = list(cases)
-    for case in cases:
-        case.run()  # warm caches, start threads
-        case.laps.clear()
     began = time.perf_counter()
     rounds = 0
     while rounds < fewest or time.perf_counter() - began < seconds:
         for case in cases:
+            # small sheets take as many laps as fit into the time of a large one
+            until = time.perf_counter() + TURN_SECONDS
             case.run()
+            while time.perf_counter() < until:
+                case.run()
         rounds += 1
         if watch is not None:
             watch(min(1.0, (time.perf_counter() - began) / max(seconds, 1e-9)))

@@ -63,9 +63,14 @@ MAKERS: dict[str, Callable[[Problem, int], Simulation]] = {"cpu": Simulation}
 """What advances a problem on each device. Another device adds itself here; it has to restore checkpoints."""
 
 
-def formed_sheet(
-    cells: int, contact: bool, threads: int = 1, device: str = "cpu", source: Simulation | None = None
-) -> Simulation:
+def same_sheet(simulation: Simulation, threads: int, device: str) -> Simulation:
+    """The same sheet in the same state, advanced by other threads or another device (one of :data:`MAKERS`)."""
+    twin = MAKERS[device](simulation.problem, threads)
+    twin.restore(simulation.checkpoint())
+    return twin
+
+
+def formed_sheet(cells: int, contact: bool, source: Simulation | None = None) -> Simulation:
     """A sheet in the middle of its stroke.
 
     Parameters
@@ -74,10 +79,6 @@ def formed_sheet(
         Along a side.
     contact
         With the three tools; without, the formed sheet springs back freely.
-    threads
-        Bands of rows.
-    device
-        One of :data:`MAKERS`.
     source
         The formed blank whose shape, speed, friction and clock are taken over; :func:`formed_source` without.
 
@@ -86,7 +87,7 @@ def formed_sheet(
     A simulation that has made at least :data:`SETTLING` steps of its own.
     """
     source = source or formed_source()
-    simulation = MAKERS[device](sheet_problem(cells, contact), threads)
+    simulation = Simulation(sheet_problem(cells, contact))
     taken, saved = source.checkpoint(), simulation.checkpoint()
     rows, columns = simulation.rows, simulation.columns
     groups = [(at.POSITION, at.POSITION, 6)]
