@@ -23,7 +23,7 @@ def example(name: str) -> ModuleType:
 
 
 def test_every_example_is_tested() -> None:
-    tested = {"hemisphere_angles", "compare_holder_forces", "tensile_strip"}
+    tested = {"hemisphere_angles", "compare_holder_forces", "tensile_strip", "picture_frame_of_a_laboratory"}
     assert {path.stem for path in FOLDER.glob("*.py")} == tested
 
 
@@ -50,6 +50,12 @@ def test_holder_acts_through_friction_alone() -> None:
 def test_strip_returns_the_curve_of_the_card() -> None:
     # Eq. 11 is exact for straight lines of equal connectors; what is left is inertia and the output's averaging
     assert example("tensile_strip").main() < 0.01
+
+
+def test_virtual_frame_of_a_laboratory_returns_its_table(tmp_path) -> None:
+    # reading the points off a printed figure costs about 1 % of its axis, which ends a little above the largest force
+    assert example("picture_frame_of_a_laboratory").main(tmp_path) < 0.01
+    assert (tmp_path / "frame.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow

@@ -5,34 +5,34 @@
    heats of friction and damping for the energy ledger, the survey that finds the rows each tool can touch.
 
    What it may do and the package may not: every cell is whole and every crossing is there, so cell volume and line weights are
-   numbers and mass and area are one row for all; a row meets all its tools in one loop, compiled for each way
-   in which they can stand to it; heats are summed in registers.
+   numbers and mass and area are one row for all; a piece of a row meets all its tools in one loop, which also moves it,
+   compiled for each way in which they can stand to it; heats are summed in registers.
 
    Sizes and degrees are macros: STRIDE, TOOLS (0 or 3), WARP_DEGREE, WEFT_DEGREE, SHEAR_DEGREE, SERIES, and RESTRICT
-   (1: a tool is evaluated on rows that it can touch; 0: everywhere). */
+   (1: a tool is evaluated on pieces of rows that it can touch; 0: everywhere). */
 
 #include <immintrin.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-#define FIELDS (6 + 3 * TOOLS)
-#define ROW ((size_t)FIELDS * STRIDE)
+#define ROW ((size_t)6 * STRIDE)
 #define LEAD 8
+#define LANES 8
 #define INLINE static inline __attribute__((always_inline))
 
 enum { CLEAR, TOUCHING, ON_FACE };
 enum { SIDE_S, S0, SIDE_Z, Z0, RADIUS, HALF, STIFFNESS, FRICTION, RATIO, MOTION, MASS, RATE, TOOL_COLUMNS };
 enum { AT, SPEED, REACTION, LAST_AT, LAST_REACTION, LAST_DRIVE, WORK, DAMPED, POSE_COLUMNS };
-enum { FASTEST, WARP_SQUARED, WEFT_SQUARED, LEAST_SQUARED, TANGENT_PARTS, PENETRATION, FINITE, SURVEYED };
+enum { FASTEST, WARP_SQUARED, WEFT_SQUARED, LEAST_SQUARED, TANGENT, PENETRATION, FINITE, MOVING, SURVEYED };
 
 typedef struct {
     int64_t rows, columns;
-    double *state;               /* [rows][FIELDS][STRIDE]: x y z, vx vy vz, friction force of each tool */
+    double *state;               /* [rows][6][STRIDE]: x y z, vx vy vz */
+    double *grip;                /* [rows][TOOLS][3][STRIDE]: friction traction of each tool */
     const double *inverse_mass;  /* [2][STRIDE]: first and last row, rows between; the same for those below */
     const double *inertia;       /* area whose mass a crossing carries */
     const double *area;          /* area in contact */
-    const double *inverse_area;
     const double *warp_line, *weft_line; /* [STRIDE]: 1 where a line starts at the column */
     const double *warp, *weft, *shear, *series; /* coefficients, highest power first */
     double warp_end[3], weft_end[3], shear_end[2]; /* width, slope beyond, slope in compression */
@@ -40,7 +40,7 @@ typedef struct {
     double density, damping, viscous; /* viscous: viscosity times cell area */
     double *tools;               /* [TOOLS][TOOL_COLUMNS] */
     double *poses;               /* [TOOLS][POSE_COLUMNS] */
-    int8_t *touching;            /* [rows][TOOLS] */
+    int8_t *touching;            /* [rows][blocks of LANES columns]: how the block stands to the tools, digits to base 3 */
     const double *times, *values; /* motions: [motions][knots] */
     const int64_t *knots;
     int64_t most_knots;
@@ -88,17 +88,16 @@ static double weft_force[3][LEAD + STRIDE] __attribute__((aligned(64)));
 static double upper[3][LEAD + STRIDE] __attribute__((aligned(64)));
 static double below[3][LEAD + STRIDE] __attribute__((aligned(64)));
 
-/* Pull of a connector along (dx, dy, dz), per length, and the heat of its dashpot. */
+/* Pull of a connector along (dx, dy, dz), per length, and the heat of its dashpot, which acts on the initial length. */
 INLINE double connector(double squared, double inverse, double dx, double dy, double dz, double ux, double uy, double uz,
                         const double *c, int degree, const double *end, double inverse_length, double viscosity, double weight,
                         double *heat)
 {
     double strain = squared * inverse * inverse_length - 1.0;
     double pull = law(c, degree, end, most(strain, 0.0)) + end[2] * least(strain, 0.0);
-    double rate = (dx * ux + dy * uy + dz * uz) * inverse;
-    double drag = viscosity * rate;
+    double rate = dx * ux + dy * uy + dz * uz, drag = viscosity * rate;
     *heat += weight * drag * rate;
-    return weight * (pull + drag) * inverse;
+    return weight * (pull * inverse + drag);
 }
 
 /* Warp connectors of a row, and the cells and weft connectors above it. Returns the heat of the dashpots. */
@@ -120,7 +119,7 @@ INLINE double edges(const Sheet *q, const double *restrict row, double viscosity
     const double *restrict warp_line = q->warp_line, *restrict weft_line = q->weft_line;
     const double i1 = 1.0 / q->warp_pitch, i2 = 1.0 / q->weft_pitch, e1 = q->warp_modulus, e2 = q->weft_modulus;
     const double volume = 0.5 * q->volume, stabilise = q->hourglass * q->volume;
-    const double h1 = 0.5 * i1, h2 = 0.5 * i2;
+    const double h1 = 0.5 * i1, h2 = 0.5 * i2, c1 = viscosity * i1 * i1, c2 = viscosity * i2 * i2;
     double *restrict w0 = warp_force[0] + LEAD, *restrict w1 = warp_force[1] + LEAD, *restrict w2 = warp_force[2] + LEAD;
     double *restrict q0 = half_weft[0] + LEAD, *restrict q1 = half_weft[1] + LEAD, *restrict q2 = half_weft[2] + LEAD;
     double *restrict f0 = weft_force[0] + LEAD, *restrict f1 = weft_force[1] + LEAD, *restrict f2 = weft_force[2] + LEAD;
@@ -147,9 +146,9 @@ INLINE double edges(const Sheet *q, const double *restrict row, double viscosity
         double inverse = 1.0 / (by * diagonal);
         double line = warp_line[i], hot = 0.0;
         double f = connector(warp2, warp_root, lx, ly, lz, vx[i + 1] - vx[i], vy[i + 1] - vy[i], vz[i + 1] - vz[i], cw,
-                             WARP_DEGREE, ew, i1, viscosity, line, &hot);
+                             WARP_DEGREE, ew, i1, c1, line, &hot);
         double w = connector(weft2, weft_root, ax, ay, az, vxu[i] - vx[i], vyu[i] - vy[i], vzu[i] - vz[i], cf, WEFT_DEGREE,
-                             ef, i2, viscosity, weft_line[i], &hot);
+                             ef, i2, c2, weft_line[i], &hot);
         double px = f * lx + t0[i], py = f * ly + t1[i], pz = f * lz + t2[i];
         double t = g12 * (inverse * by);
         double d = inverse * diagonal, by_pp = d * product, by_product = d * pp;
@@ -182,8 +181,8 @@ static double last_edges(const Sheet *q, const double *restrict row, double visc
     for (int64_t i = 0; i < q->columns; i++) {
         double dx = x[i + 1] - x[i], dy = y[i + 1] - y[i], dz = z[i + 1] - z[i], squared = dx * dx + dy * dy + dz * dz;
         double f = connector(squared, inverse_root(squared), dx, dy, dz, vx[i + 1] - vx[i], vy[i + 1] - vy[i],
-                             vz[i + 1] - vz[i], q->warp, WARP_DEGREE, q->warp_end, 1.0 / q->warp_pitch, viscosity,
-                             q->warp_line[i], &heat);
+                             vz[i + 1] - vz[i], q->warp, WARP_DEGREE, q->warp_end, 1.0 / q->warp_pitch,
+                             viscosity / (q->warp_pitch * q->warp_pitch), q->warp_line[i], &heat);
         warp_force[0][LEAD + i] = f * dx + upper[0][LEAD + i];
         warp_force[1][LEAD + i] = f * dy + upper[1][LEAD + i];
         warp_force[2][LEAD + i] = f * dz + upper[2][LEAD + i];
@@ -197,12 +196,12 @@ typedef struct {
     double side_s, s0, side_z, z0, radius, half, stiffness, friction, ratio, z, moved;
 } Pose;
 
-/* Contact of a crossing with a tool: adds its force, keeps the friction force, returns the axial force. */
+/* Contact of a crossing with a tool: adds its force, keeps the friction traction, returns the axial force. */
 INLINE double touch(const Pose p, int how, double x, double y, double z, double wayx, double wayy, double wayz, double away,
-                    double by_away, double area, double inverse_area, double *tx, double *ty, double *tz, double *fx, double *fy,
-                    double *fz, double *heat)
+                    double by_away, double area, double *tx, double *ty, double *tz, double *fx, double *fy, double *fz,
+                    double *heat)
 {
-    double k = p.stiffness * area, kt = p.ratio * k, distance, nx, ny, nz;
+    double kt = p.ratio * p.stiffness, distance, nx, ny, nz;
     if (how == ON_FACE) {
         distance = p.side_z * (z - p.z - p.z0) - p.radius;
         nx = ny = 0.0;
@@ -219,7 +218,7 @@ INLINE double touch(const Pose p, int how, double x, double y, double z, double 
         ny = y * radial;
         nz = p.side_z * (ow * inverse + flat);
     }
-    double press = k * most(p.half - distance, 0.0);
+    double press = p.stiffness * most(p.half - distance, 0.0);
     double wx = *tx - kt * wayx, wy = *ty - kt * wayy, wz = 0.0;
     if (how != ON_FACE) {
         wz = *tz - kt * (wayz - p.moved);
@@ -232,33 +231,31 @@ INLINE double touch(const Pose p, int how, double x, double y, double z, double 
     double inverse = inverse_root(most(squared, 1.0e-300));
     double share = least(1.0, p.friction * press * inverse);
     double size = squared * inverse, kept = share * size;
-    *heat += (size - kept) * kept * inverse_area;
+    *heat += area * ((size - kept) * kept);
     *tx = wx = share * wx;
     *ty = wy = share * wy;
-    *tz = wz = share * wz;
-    double axial = press * nz + wz;
-    *fx += press * nx + wx;
-    *fy += press * ny + wy;
+    if (how != ON_FACE) *tz = wz = share * wz;
+    double axial = area * (press * nz + wz);
+    *fx += area * (press * nx + wx);
+    *fy += area * (press * ny + wy);
     *fz += axial;
     return axial;
 }
 
-/* Sum of the forces on the crossings of a row, contact with each tool as it stands to the row, and central differences. */
-INLINE void crossings(Sheet *q, double *restrict row, int64_t j, const int *how, double step, double last_step, double kick,
-                      double keep, double damping, double *reactions)
+/* Sum of the forces on a piece of a row, contact with each tool as it stands to it, and central differences. */
+INLINE void crossings(Sheet *q, double *restrict row, int64_t j, int64_t begin, int64_t end, const int *how, double step,
+                      double last_step, double kick, double keep, double damping, double *reactions)
 {
     const int profile = j > 0 && j < q->rows - 1;
     const double *restrict inverse_mass = q->inverse_mass + profile * STRIDE;
     const double *restrict inertia = q->inertia + profile * STRIDE;
     const double *restrict area = q->area + profile * STRIDE;
-    const double *restrict inverse_area = q->inverse_area + profile * STRIDE;
     double *restrict x = row, *restrict y = row + STRIDE, *restrict z = row + 2 * STRIDE;
     double *restrict vx = row + 3 * STRIDE, *restrict vy = row + 4 * STRIDE, *restrict vz = row + 5 * STRIDE;
     const double *restrict w0 = warp_force[0] + LEAD, *restrict w1 = warp_force[1] + LEAD, *restrict w2 = warp_force[2] + LEAD;
     const double *restrict q0 = half_weft[0] + LEAD, *restrict q1 = half_weft[1] + LEAD, *restrict q2 = half_weft[2] + LEAD;
     const double *restrict f0 = weft_force[0] + LEAD, *restrict f1 = weft_force[1] + LEAD, *restrict f2 = weft_force[2] + LEAD;
     double *restrict b0 = below[0] + LEAD, *restrict b1 = below[1] + LEAD, *restrict b2 = below[2] + LEAD;
-    const int64_t n = (q->columns + 7) & ~7;
     double damped = 0.0;
 #if TOOLS
     Pose pose[3];
@@ -267,14 +264,14 @@ INLINE void crossings(Sheet *q, double *restrict row, int64_t j, const int *how,
         pose[k] = (Pose){t[SIDE_S], t[S0], t[SIDE_Z], t[Z0], t[RADIUS], t[HALF], t[STIFFNESS], t[FRICTION], t[RATIO],
                          p[AT], p[AT] - p[LAST_AT]};
     }
-    double *restrict t0 = row + 6 * STRIDE, *restrict t1 = row + 9 * STRIDE, *restrict t2 = row + 12 * STRIDE;
+    double *restrict t0 = q->grip + j * (9 * STRIDE), *restrict t1 = t0 + 3 * STRIDE, *restrict t2 = t1 + 3 * STRIDE;
     double r0 = 0.0, r1 = 0.0, r2 = 0.0, s0 = 0.0, s1 = 0.0, s2 = 0.0;
     const int curved = how[0] == TOUCHING || how[1] == TOUCHING || how[2] == TOUCHING;
 #pragma omp simd reduction(+ : damped, r0, r1, r2, s0, s1, s2)
 #else
 #pragma omp simd reduction(+ : damped)
 #endif
-    for (int64_t i = 0; i < n; i++) {
+    for (int64_t i = begin; i < end; i++) {
         double ux = f0[i] + q0[i - 1], uy = f1[i] + q1[i - 1], uz = f2[i] + q2[i - 1];
         double fx = w0[i] - w0[i - 1] + ux - b0[i], fy = w1[i] - w1[i - 1] + uy - b1[i], fz = w2[i] - w2[i - 1] + uz - b2[i];
         b0[i] = ux, b1[i] = uy, b2[i] = uz;
@@ -288,7 +285,7 @@ INLINE void crossings(Sheet *q, double *restrict row, int64_t j, const int *how,
         }
 #define TOUCH(k, t, r, s)                                                                                                  \
         if (how[k])                                                                                                        \
-            r += touch(pose[k], how[k], px, py, pz, wayx, wayy, wayz, away, by_away, area[i], inverse_area[i], t + i,       \
+            r += touch(pose[k], how[k], px, py, pz, wayx, wayy, wayz, away, by_away, area[i], t + i,                        \
                        t + STRIDE + i, t + 2 * STRIDE + i, &fx, &fy, &fz, &s);
         TOUCH(0, t0, r0, s0)
         TOUCH(1, t1, r1, s1)
@@ -363,24 +360,28 @@ void advance(Sheet *q, int64_t steps)
         double density = q->density * q->inertia_factor;
         double damping = 0.25 * q->damping * density * mean_step, viscosity = q->viscous * density / q->step;
         double reactions[3] = {0.0, 0.0, 0.0}, heat = 0.0;
+        const int64_t n = (q->columns + 7) & ~7;
         memset(below, 0, sizeof below);
         memset(upper, 0, sizeof upper);
         for (int64_t j = 0; j < q->rows; j++) {
             double *row = q->state + j * ROW;
             heat += j + 1 < q->rows ? edges(q, row, viscosity) : last_edges(q, row, viscosity);
+#if !TOOLS
+            crossings(q, row, j, 0, n, 0, q->step, q->last_step, kick, keep, damping, reactions);
+#elif !RESTRICT
+            crossings(q, row, j, 0, n, (const int[]){1, 1, 1}, q->step, q->last_step, kick, keep, damping, reactions);
+#else
+            const int8_t *how = q->touching + j * (n / LANES);
+            for (int64_t begin = 0, end; begin < n; begin = end) {
+                const int8_t code = how[begin / LANES];
+                for (end = begin + LANES; end < n && how[end / LANES] == code;) end += LANES;
 #define NODES(a, b, c)                                                                                                     \
     case 9 * a + 3 * b + c:                                                                                                \
-        crossings(q, row, j, (const int[]){a, b, c}, q->step, q->last_step, kick, keep, damping, reactions);               \
+        crossings(q, row, j, begin, end, (const int[]){a, b, c}, q->step, q->last_step, kick, keep, damping, reactions);   \
         break;
-#if !TOOLS
-            crossings(q, row, j, 0, q->step, q->last_step, kick, keep, damping, reactions);
-#elif !RESTRICT
-            crossings(q, row, j, (const int[]){1, 1, 1}, q->step, q->last_step, kick, keep, damping, reactions);
-#else
-            switch (9 * q->touching[3 * j] + 3 * q->touching[3 * j + 1] + q->touching[3 * j + 2]) {
-                NODES(0, 0, 0) NODES(0, 0, 1) NODES(0, 0, 2) NODES(0, 1, 0) NODES(0, 1, 1) NODES(0, 1, 2)
-                NODES(0, 2, 0) NODES(0, 2, 1) NODES(0, 2, 2) NODES(1, 0, 0) NODES(1, 0, 1) NODES(1, 0, 2)
-                NODES(1, 1, 0) NODES(1, 1, 1) NODES(1, 1, 2) NODES(1, 2, 0) NODES(1, 2, 1) NODES(1, 2, 2)
+#define NODES3(a, b) NODES(a, b, 0) NODES(a, b, 1) NODES(a, b, 2)
+#define NODES9(a) NODES3(a, 0) NODES3(a, 1) NODES3(a, 2)
+                switch (code) { NODES9(0) NODES9(1) NODES9(2) }
             }
 #endif
         }
@@ -392,39 +393,27 @@ void advance(Sheet *q, int64_t steps)
     _mm_setcsr(mode);
 }
 
-/* A look at the whole state: extremes for the stable step, and how each row stands to each tool. */
+/* A look at the whole state: extremes for the stable step, and how each block of a row stands to each tool. */
 void survey(Sheet *q, double *found, int64_t ahead, double margin)
 {
-    double fastest = 0.0, warp = 0.0, weft = 0.0, shortest = 1.0e300, tangent = 0.0, deepest = 0.0, sum = 0.0;
-    static double gaps[8192][3], rooms[8192][3];
-    const int64_t columns = q->columns;
+    double fastest = 0.0, warp = 0.0, weft = 0.0, shortest = 1.0e300, tangent = 0.0, deepest = 0.0, sum = 0.0, moving = 0.0;
+    const int64_t columns = q->columns, blocks = (columns + 7) / LANES;
     for (int64_t j = 0; j < q->rows; j++) {
         const double *restrict x = q->state + j * ROW, *restrict y = x + STRIDE, *restrict z = x + 2 * STRIDE;
         const double *restrict vx = x + 3 * STRIDE, *restrict vy = x + 4 * STRIDE, *restrict vz = x + 5 * STRIDE;
-#pragma omp simd reduction(max : fastest) reduction(+ : sum)
+        const double *restrict inertia = q->inertia + (j > 0 && j < q->rows - 1) * STRIDE;
+#pragma omp simd reduction(max : fastest) reduction(+ : sum, moving)
         for (int64_t i = 0; i < columns; i++) {
-            fastest = most(fastest, vx[i] * vx[i] + vy[i] * vy[i] + vz[i] * vz[i]);
-            sum += x[i] + y[i] + z[i];
+            double speed = vx[i] * vx[i] + vy[i] * vy[i] + vz[i] * vz[i];
+            fastest = most(fastest, speed);
+            moving += inertia[i] * speed;
+            sum += x[i] + y[i] + z[i] + speed;
         }
 #pragma omp simd reduction(max : warp) reduction(min : shortest)
         for (int64_t i = 0; i < columns - 1; i++) {
             double dx = x[i + 1] - x[i], dy = y[i + 1] - y[i], dz = z[i + 1] - z[i], squared = dx * dx + dy * dy + dz * dz;
             warp = most(warp, squared);
             shortest = least(shortest, squared);
-        }
-        for (int k = 0; k < TOOLS; k++) {
-            const double *t = q->tools + k * TOOL_COLUMNS, *p = q->poses + k * POSE_COLUMNS;
-            double g = 1.0e300, r = 1.0e300;
-            const double side_s = t[SIDE_S], s0 = t[S0], side_z = t[SIDE_Z], z0 = t[Z0] + p[AT], off = t[RADIUS] + t[HALF];
-#pragma omp simd reduction(min : g, r)
-            for (int64_t i = 0; i < columns; i++) {
-                double away = sqrt(x[i] * x[i] + y[i] * y[i]), u = side_s * (away - s0), w = side_z * (z[i] - z0);
-                double ou = most(u, 0.0), ow = most(w, 0.0);
-                g = least(g, sqrt(ou * ou + ow * ow) + least(most(u, w), 0.0) - off);
-                r = least(r, -u);
-            }
-            gaps[j][k] = g, rooms[j][k] = r;
-            deepest = most(deepest, -g);
         }
         if (j + 1 == q->rows) continue;
         const double *restrict xu = x + ROW, *restrict yu = y + ROW, *restrict zu = z + ROW;
@@ -449,18 +438,38 @@ void survey(Sheet *q, double *found, int64_t ahead, double margin)
         }
     }
     fastest = sqrt(fastest);
-    for (int k = 0; k < TOOLS; k++) {
-        const double *p = q->poses + k * POSE_COLUMNS;
-        double way = 2.0 * (fastest * ahead * q->step + fabs(p[AT] - p[LAST_AT]) * ahead) + margin;
-        for (int64_t j = 0; j < q->rows; j++)
-            q->touching[3 * j + k] = gaps[j][k] >= way ? CLEAR : rooms[j][k] > way ? ON_FACE : TOUCHING;
+    if (TOOLS) memset(q->touching, 0, q->rows * blocks);
+    for (int k = 0, digit = 9; k < TOOLS; k++, digit /= 3) {
+        const double *t = q->tools + k * TOOL_COLUMNS, *p = q->poses + k * POSE_COLUMNS;
+        const double side_s = t[SIDE_S], s0 = t[S0], side_z = t[SIDE_Z], z0 = t[Z0] + p[AT], off = t[RADIUS] + t[HALF];
+        const double way = 2.0 * (fastest * ahead * q->step + fabs(p[AT] - p[LAST_AT]) * ahead) + margin;
+        double gap[STRIDE], room[STRIDE];
+        for (int64_t i = columns; i < LANES * blocks; i++) gap[i] = room[i] = 1.0e300;
+        for (int64_t j = 0; j < q->rows; j++) {
+            const double *restrict x = q->state + j * ROW, *restrict y = x + STRIDE, *restrict z = x + 2 * STRIDE;
+#pragma omp simd
+            for (int64_t i = 0; i < columns; i++) {
+                double away = sqrt(x[i] * x[i] + y[i] * y[i]), u = side_s * (away - s0), w = side_z * (z[i] - z0);
+                double ou = most(u, 0.0), ow = most(w, 0.0);
+                gap[i] = sqrt(ou * ou + ow * ow) + least(most(u, w), 0.0) - off;
+                room[i] = -u;
+            }
+            for (int64_t b = 0; b < blocks; b++) {
+                double g = 1.0e300, r = 1.0e300;
+#pragma omp simd reduction(min : g, r)
+                for (int64_t i = LANES * b; i < LANES * (b + 1); i++) g = least(g, gap[i]), r = least(r, room[i]);
+                q->touching[j * blocks + b] += digit * (g >= way ? CLEAR : r > way ? ON_FACE : TOUCHING);
+                deepest = most(deepest, -g);
+            }
+        }
     }
     found[FASTEST] = fastest;
     found[WARP_SQUARED] = warp;
     found[WEFT_SQUARED] = weft;
     found[LEAST_SQUARED] = shortest;
-    found[TANGENT_PARTS] = tangent;
+    found[TANGENT] = tangent;
     found[PENETRATION] = deepest;
+    found[MOVING] = moving;
     uint64_t bits; /* compiled for finite numbers, so it looks at the exponent itself */
     memcpy(&bits, &sum, 8);
     found[FINITE] = (bits >> 52 & 0x7FF) != 0x7FF;

@@ -12,17 +12,22 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from weftform.comparison import compare
     from weftform.execution import run
     from weftform.fabric import Fabric
+    from weftform.identification import Target, identify
     from weftform.result import Result
     from weftform.study import Study
 
-__all__ = ["Fabric", "Result", "Study", "__version__", "run"]
+__all__ = ["Fabric", "Result", "Study", "Target", "__version__", "compare", "identify", "run"]
 
 _HOMES = {
     "Fabric": "weftform.fabric",
     "Result": "weftform.result",
     "Study": "weftform.study",
+    "Target": "weftform.identification",
+    "compare": "weftform.comparison",
+    "identify": "weftform.identification",
     "run": "weftform.execution",
 }
 

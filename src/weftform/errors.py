@@ -74,6 +74,10 @@ class MeasurementError(WeftformError):
     """A file of measurements that cannot be used."""
 
 
+class IdentificationError(WeftformError):
+    """An inverse identification that cannot be made as asked."""
+
+
 class UnstableRun(WeftformError):
     """The simulation blew up; what was computed before is kept."""
 

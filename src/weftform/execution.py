@@ -14,6 +14,7 @@ import numpy as np
 
 from weftform.cases import Case, case_of
 from weftform.errors import ResultError, StudyError, UnstableRun
+from weftform.processors import crowding, usable_processors
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
@@ -83,8 +84,7 @@ def threads_for(cells: int, wanted: int | None) -> int:
 
     most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     if wanted is None:
-        available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        return max(1, min(available, most, cells // CELLS_PER_THREAD))
+        return max(1, min(usable_processors(), most, cells // CELLS_PER_THREAD))
     if not 1 <= wanted <= most:
         raise StudyError(
             "that number of threads cannot be had",
@@ -158,6 +158,7 @@ class Run:
         self._last_sound = self._fields()
         self.peak_penetration = 0.0
         self.wall = 0.0
+        self._loop_s = self._processor_s = 0.0
         self._forces: list[float] = []
         self._resume = resume
         self._resumed_to = -1.0
@@ -191,8 +192,10 @@ class Run:
                 if stop in frames_at:
                     self._frame(writer)
                 if time.monotonic() - self._checkpointed > CHECKPOINT_SECONDS:
+                    writer.settle()
                     self._checkpoint(float(stop))
             self._finish(writer, "done")
+            writer.settle()
             (self.out / "checkpoint.npz").unlink(missing_ok=True)
         except KeyboardInterrupt:
             self._finish(writer, f"interrupted at {self.displacement:.2f} mm")
@@ -206,10 +209,13 @@ class Run:
     def _march(self, stop: float) -> None:
         """Advance, with the clock of the time loop running: output is not counted."""
         self._started = time.perf_counter() - self.wall
+        begun, cpu = time.perf_counter(), time.process_time()
         try:
             self.simulation.advance_to(stop, self._look)
         finally:
             self.wall = time.perf_counter() - self._started
+            self._loop_s += time.perf_counter() - begun
+            self._processor_s += time.process_time() - cpu
 
     def _warm_up(self) -> None:
         """Compile, or load from the cache, before the clock starts."""
@@ -306,7 +312,11 @@ class Run:
             "ok": status == "done" and not warnings,
             "status": status,
             "warnings": warnings,
-            "notes": self.case.warnings(),
+            "notes": [
+                *self.case.warnings(),
+                *beyond_the_laws(fields),
+                *crowding(simulation.bands, usable_processors(), self._processor_s, self._loop_s),
+            ],
             "cells": grid.cell_count,
             "steps": simulation.steps,
             "wall_s": self.wall,
@@ -369,6 +379,30 @@ class Run:
                 file=path,
                 hint="resume with the same study and changes, or run anew without --resume",
             ) from None
+
+
+def beyond_the_laws(fields: Fields) -> list[str]:
+    """Which laws of the card are used beyond the range for which it gives them, where they go on straight."""
+    notes = []
+    fabric, share = fields.fabric, fields.grid.cell_share
+    here = share > 0.0
+    angle = np.abs(fields.shear_angle[here])
+    beyond = angle > fabric.shear.valid_to * (1.0 + 1e-3)
+    if beyond.any():
+        part = float(share[here][beyond].sum() / share[here].sum())
+        notes.append(
+            f"{100 * part:.3g} % of the area shears beyond {np.degrees(fabric.shear.valid_to):.3g} deg, where the shear law "
+            f"of the card ends (largest {np.degrees(angle.max()):.3g} deg): there it is continued by a straight line"
+        )
+    for name, law, strain in (("warp", fabric.warp, fields.warp_strain), ("weft", fabric.weft, fields.weft_strain)):
+        end = law.specimen_force.valid_to / law.length
+        largest = float(strain[here].max())
+        if largest > end * (1.0 + 1e-3):
+            notes.append(
+                f"the {name} is stretched by {100 * largest:.3g} %, its law in the card ends at {100 * end:.3g} %: beyond, it is "
+                "continued by a straight line"
+            )
+    return notes
 
 
 def energy_summary(rows: list[dict[str, float]]) -> dict[str, float]:

@@ -44,3 +44,14 @@ def test_shear_cycle_returns_to_zero(tmp_path):
 
 def test_shear_cycle_raises_no_warning(tmp_path):
     assert run(Study.load("shear-cycle"), tmp_path / "out").summary["warnings"] == []
+
+
+def test_beyond_the_measured_range_a_note_says_so(tmp_path):
+    changes = {"specimen.cell_length_mm": 50.0, "output.frames": 2, "fabric.override.shear.valid_to_deg": 30.0}
+    beyond = run(Study.load("picture-frame", changes), tmp_path / "beyond").summary
+    assert any("100 % of the area shears beyond 30 deg" in note and "45 deg" in note for note in beyond["notes"])
+    assert beyond["ok"]
+    within = run(
+        Study.load("picture-frame", {**changes, "loading.shear_angles_deg": [29.0]}), tmp_path / "within"
+    ).summary
+    assert within["notes"] == []

@@ -167,3 +167,18 @@ def test_a_slack_specimen_carries_its_share_of_the_first_stiffness():
     assert float(TensionLaw(law, 150.0, 50.0).force(-1.0)) == 0.0
     assert float(TensionLaw(law, 150.0, 50.0, slack_ratio=0.01).force(-1.0)) == pytest.approx(-0.1975)
     assert float(TensionLaw(law, 150.0, 50.0, slack_ratio=0.01).force(1.0)) == float(law.value(1.0))
+
+
+def test_a_level_end_is_no_fall() -> None:
+    """Rounding makes the slope of a level end about -1e-17 of the others."""
+
+    class Level:
+        valid_to = 1.0
+
+        def value(self, x):
+            return np.asarray(x)
+
+        def slope(self, x):
+            return np.where(np.asarray(x) > 0.99, -1e-17, 1.0)
+
+    assert first_fall(Level(), 1.0) is None

@@ -242,3 +242,50 @@ def test_damaged_files_end_in_a_result_or_a_measurement_error(tmp_path) -> None:
             assert problem.message and problem.file == path
         else:
             assert np.isfinite(found.law.value(U)).all()
+
+
+def test_a_lost_sample_and_a_knock_are_left_out_and_named(write) -> None:
+    force = eq4(U)
+    force[50], force[90] = 0.0, 40000.0
+    found = _tensile(write("a.csv", U, force))
+    assert any("stands alone" in w and "line 52 (0), 92 (4e+04)" in w for w in found.warnings)
+    np.testing.assert_allclose(found.fit.coefficients, [19.75, -123.13, 573.0, -91.645], rtol=1e-6)
+
+
+def test_yarns_that_break_and_noise_are_no_knocks(write) -> None:
+    """A drop that lasts stays in the curve; so does every point of a noisy one."""
+    broken = np.where(U > 3.5, 0.6, 1.0) * eq4(U)
+    noisy = eq4(U) + 100.0 * np.random.default_rng(2).standard_normal(len(U))
+    for name, force in (("broken.csv", broken), ("noisy.csv", noisy)):
+        found = _tensile(write(name, U, force), interval=(0.0, 3.4))
+        assert not any("stands alone" in w for w in found.warnings)
+        assert len(found.specimens[0].x) == len(U)
+
+
+def test_errors_of_a_spreadsheet_are_rows_not_comments(text, write) -> None:
+    lines = write("a.csv", U, eq4(U)).read_text().splitlines()
+    lines[30], lines[60], lines[80] = "#VALUE!,3", "#N/A,#N/A", "# the operator touched the table"
+    found = _tensile(text("b.csv", "\n".join(lines)))
+    (said,) = (w for w in found.warnings if "unreadable" in w)
+    assert "2 unreadable rows" in said and "line 31" in said and ", 61 " in said
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_two_decimal_marks_in_one_file_are_refused(text, every) -> None:
+    """A comma read as a mark of thousands would multiply by a hundred."""
+    rows = [f"{u:.2f};{f:.2f}" for u, f in zip(U, eq4(U), strict=True)]
+    rows = [row.replace(".", ",") if k % every else row for k, row in enumerate(rows)]
+    problem = _refused("rows cannot be read", text("a.csv", "\n".join(["displacement_mm;force_N", *rows])))
+    assert "decimal mark" in problem.hint and problem.line in (2, 3)
+
+
+def test_displacement_in_metres_without_a_unit_is_refused(write) -> None:
+    problem = _refused("ends at an elongation of", write("a.csv", U / 1000.0, eq4(U), "displacement,force"))
+    assert "--unit displacement=m" in problem.hint
+    d, f = bias_curve()
+    metres = write("b.csv", d / 1000.0, f, "displacement,force_N")
+    with pytest.raises(MeasurementError, match="before a bias-extension specimen") as caught:
+        characterise_bias_extension([metres], height=150, width=50, thickness=0.62)
+    assert caught.value.line == len(d) + 1
+    reading = Reading(units={"displacement": "m"})
+    assert characterise_bias_extension([metres], height=150, width=50, thickness=0.62, reading=reading).shear

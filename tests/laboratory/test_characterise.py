@@ -149,7 +149,7 @@ def test_card_without_a_change_is_the_same_bytes(tmp_path) -> None:
         (["--thickness", "0.5"], "the card says 0.62, the option 0.5"),
         (["--name", "other"], "the option says other"),
         (["--height", "90"], "height / width >= 2"),
-        (["--column", "force"], "QUANTITY=VALUE"),
+        (["--column", "force"], "NAME=VALUE"),
         (["--column", "force=nowhere"], "no column for force_N"),
         (["--unit", "force=mm"], "no unit of force_N"),
         (["--only", "nobody", "--preset", "zwick"], "no reader preset"),
@@ -239,6 +239,29 @@ def test_figures_are_drawn_beside_the_card(tmp_path) -> None:
         tmp_path / "f",
     )
     assert len(list((tmp_path / "f").iterdir())) == 3
+
+
+def test_shear_map_of_a_full_field_export(tmp_path) -> None:
+    png, table = tmp_path / "new" / "map.png", tmp_path / "map.csv"
+    result = _run("shear-map", *sample("dic-aramis"), "--png", png, "--csv", table)
+    assert "mean 20.0" in result.output and "1 of 63 points lost" in result.output
+    assert png.stat().st_size > 10_000
+    angle = np.loadtxt(table, delimiter=",", skiprows=1)[:, 2]
+    # trellis of 20 degrees; 0.003 mm of noise on points 3 mm apart
+    assert angle.mean() == pytest.approx(20.0, abs=0.1) and np.abs(angle - 20.0).max() < 1.0
+    turned = _run("shear-map", *sample("dic-aramis"), "--png", png, "--warp-deg", "-45")
+    assert "mean 20.0" in turned.output or "mean -20.0" in turned.output
+    assert "triangulated" in _run("shear-map", _line(tmp_path), "--png", png, code=2).output
+    assert (
+        "cannot be written"
+        in _run("shear-map", *sample("dic-aramis"), "--csv", tmp_path / "no" / "m.csv", code=2).output
+    )
+
+
+def _line(folder):
+    path = folder / "line.csv"
+    path.write_text("x_mm,y_mm,shift_x_mm,shift_y_mm\n" + "".join(f"{k},{k},0,0\n" for k in range(9)))
+    return path
 
 
 def test_help_needs_no_heavy_import() -> None:

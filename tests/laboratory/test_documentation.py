@@ -23,6 +23,7 @@ def test_docstring_examples(name) -> None:
 def test_page(tmp_path, monkeypatch) -> None:
     from typer.testing import CliRunner
 
+    from weftform import Study, run
     from weftform.cli.characterise import app
     from weftform.fabric import Fabric
 
@@ -34,7 +35,15 @@ def test_page(tmp_path, monkeypatch) -> None:
         for command in block.replace("\\\n", " ").split("$ weftform characterise ")[1:]:
             words = [w.strip('"') for w in re.findall(r'"[^"]*"|\S+', command)]
             files = [[str(p) for p in sorted(Path().glob(w))] if "?" in w else [w] for w in words]
-            result = CliRunner().invoke(app, [*(f for fs in files for f in fs), "--no-figures"])
+            quiet = [] if words[0] == "shear-map" else ["--no-figures"]
+            result = CliRunner().invoke(app, [*(f for fs in files for f in fs), *quiet])
             assert result.exit_code == 0, result.output
+        for command in block.replace("\\\n", " ").split("$ weftform run ")[1:]:
+            words = command.split()
+            study, out = words[0], words[words.index("--out") + 1]
+            changes = [words[k + 1] for k, w in enumerate(words) if w == "--set"]
+            loaded = Study.load(study, changes)
+            if study == "picture-frame":  # the bias test takes longer; that it loads is enough here
+                assert run(loaded, Path(out)).summary["ok"]
     assert Fabric.load("my-twill.toml").name == "my twill"
     assert Fabric.load("twintex-uml.toml").thickness == 1.2

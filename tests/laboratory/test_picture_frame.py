@@ -82,6 +82,20 @@ def test_every_laboratory_of_cao_yields_a_valid_card(laboratory, law, tmp_path) 
     assert inside.mean() > 0.9
 
 
+def test_law_reaches_the_last_rising_point_and_follows_the_first_degrees(write) -> None:
+    """The largest force lies between two places of the grid of the mean; friction starts the curve with a step."""
+    found = characterise_picture_frame(
+        sample("cao2008-picture-frame"), frame_side=100, fabric_side=100, thickness=1.2, reading=Reading(only=("UT",))
+    )
+    assert found.interval_deg[1] == pytest.approx(33.13) and any("falls beyond 33.13 deg" in w for w in found.warnings)
+    angle = np.linspace(0.0, 45.0, 91)
+    force = np.where(angle > 0.0, 0.01, 0.0) + 0.0002 * angle
+    path = write("step.csv", angle, force, "shear_angle_deg,normalised_shear_force_N_per_mm")
+    law = characterise_picture_frame([path], **SIZE).shear
+    at = angle[2:]
+    np.testing.assert_allclose(law.normalised_force(np.radians(at)), force[2:], rtol=0.02)
+
+
 def test_laboratories_together_give_their_scatter() -> None:
     found = characterise_picture_frame(sample("cao2008-picture-frame"), frame_side=100, fabric_side=100, thickness=1.2)
     assert len(found.specimens) == 7 and len(found.curves) == 7

@@ -93,3 +93,16 @@ def test_a_folder_that_cannot_be_written_is_named(along_yarns, tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(ResultError, match="cannot be written"):
         write_figures(along_yarns, tmp_path / "file")
+
+
+def test_shear_tests_show_the_law_that_comes_back(tmp_path):
+    """Also beyond the range of the law, and through negative angles."""
+    changes = {
+        "specimen.cell_length_mm": 50.0,
+        "output.frames": 2,
+        "loading.shear_angles_deg": [20.0, -20.0],
+        "fabric.override.shear.valid_to_deg": 15.0,
+    }
+    files = write_figures(run(Study.load("picture-frame", changes), tmp_path / "result"))
+    assert [f.stem for f in files] == ["shear-angle-deformed", "force", "energies", "shear-force"]
+    assert_shows_something(files[-1])

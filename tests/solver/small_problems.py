@@ -89,7 +89,7 @@ def affine(grid, gradient, origin=(0.0, 0.0, 0.0)):
 def put(simulation, positions):
     """Place the crossings of a simulation."""
     for c in range(3):
-        simulation._state[simulation._row_index, at.POSITION + c, : simulation.columns] = positions[..., c]
+        simulation.sheet.state[simulation.sheet.row_index, at.POSITION + c, : simulation.columns] = positions[..., c]
 
 
 def first_forces(simulation):

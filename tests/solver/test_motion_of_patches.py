@@ -333,7 +333,7 @@ def test_too_many_steps_end_the_run_with_advice():
 def test_nan_infinity_and_overflow_are_detected_at_once(value, field):
     grid = whole_grid()
     simulation = free(grid)
-    simulation._state[2, field, 3] = value
+    simulation.sheet.state[2, field, 3] = value
     with pytest.raises(UnstableRun, match="blew up at step 8,"):
         simulation.advance_to(0.1)
 

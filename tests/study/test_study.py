@@ -422,3 +422,20 @@ def test_enormous_file_is_refused_without_reading_it(tmp_path):
     start = time.perf_counter()
     assert "too large" in refused(file).message
     assert time.perf_counter() - start < 1.0
+
+
+def test_card_of_a_change_is_seen_from_the_current_folder(tmp_path, monkeypatch):
+    """Of a shipped study or of one in another folder; a card named in the study itself is beside it."""
+    from weftform.fabric import shipped_cards
+
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    text = shipped_cards()["hexforce-48600-c1300"].read_text(encoding="utf-8")
+    (here / "mine.toml").write_text(text.replace('name = "hexforce-48600-c1300"', 'name = "mine"'), encoding="utf-8")
+    monkeypatch.chdir(here)
+    study = Study.load("picture-frame", ["fabric.card=mine.toml"])
+    assert study.fabric.name == "mine"
+    (there / "again.toml").write_text(study.to_toml(), encoding="utf-8")
+    monkeypatch.chdir(there)
+    assert Study.load("again.toml").fabric.name == "mine"

@@ -8,23 +8,26 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from weftform.benchmark.reference import Reference
 from weftform.benchmark.sheet import same_sheet, sheet_study
 from weftform.cases import case_of
 from weftform.result.fields import Fields
 from weftform.solver import Simulation
-from weftform.solver import layout as at
-from weftform.solver.layout import Layout
+from weftform.solver.simulation import LEDGER_EVERY, SURVEY_EVERY
+from weftform.solver.survey import ON_FACE, TOUCHING
 
-LAP_STEPS = 256
-"""Steps of a lap: four surveys and one entry of the ledger; a row of the history is added as often as the study asks.
-The C program makes as many, with four surveys: short laps find quiet moments of a busy machine that long ones miss."""
+LAP_SURVEYS = 2
+LAP_STEPS = LAP_SURVEYS * SURVEY_EVERY
+"""Steps of a lap; entries of the ledger and rows of the history are added as often as a run makes them.
+The C program makes as many steps and surveys: short laps find quiet moments of a busy machine that long ones miss."""
 TURN_SECONDS = 0.25
 """A case keeps its turn for as long as this."""
 
 WEFTFORM = "weftform"
 C_REFERENCE = "c-reference"
-C_EVERYWHERE = "c-reference, contact on all rows"
+C_EVERYWHERE = "c-reference, contact everywhere"
 
 
 @dataclass
@@ -90,23 +93,41 @@ class Timed:
         }
 
 
-def arithmetic(layout: Layout, touched: float) -> dict[str, float]:
+def arithmetic(simulation: Simulation, touching: float, on_face: float) -> dict[str, float]:
     """Operations and memory traffic of one cell in one step, for the roofline.
 
-    Counted by hand in the formulas of ``mechanics``: an addition, multiplication, division or root is one, a
-    comparison none. ``touched`` is the mean number of tools evaluated on a crossing. Bytes are those of a sheet far
-    larger than the caches: what a sweep reads, and what it writes back.
+    Counted by hand in the formulas of ``mechanics`` and ``solver.rows``: an addition, multiplication, division, root or
+    inverse root is one, a comparison none. Bytes are those of a sheet far larger than the caches: position and
+    velocity and, where a tool touches, its friction traction are read and written back; traits are shared by rows and
+    stay in a cache.
+
+    Parameters
+    ----------
+    touching, on_face
+        Mean number of tools evaluated on a crossing with and without a normal that turns (:func:`contact_shares`).
     """
-    connectors = 2.0 * 32.0 + 2.0 * (layout.warp_degree + layout.weft_degree)
-    cell = 176.0 + 2.0 * layout.shear_degree
-    crossing = 38.0
-    tool = 62.0
-    written = 7 + touched * at.TOOL_FIELDS
-    read = at.LEDGER + touched * at.TOOL_FIELDS
+    layout = simulation.layout
+    terms = len(simulation.material.series)
+    connectors = 2.0 * 38.0 + 2.0 * (layout.warp_degree + layout.weft_degree)
+    cell = 111.0 + 4.0 * (terms - 1) + 2.0 * layout.shear_degree
+    crossing = 43.0
+    tools = 76.0 * touching + 29.0 * on_face
     return {
-        "flops_per_cell_step": connectors + cell + crossing + tool * touched,
-        "bytes_per_cell_step": 8.0 * (written + read),
+        "flops_per_cell_step": connectors + cell + crossing + tools,
+        "bytes_per_cell_step": 8.0 * (2.0 * 6.0 + 2.0 * 3.0 * (touching + on_face)),
     }
+
+
+def contact_shares(simulation: Simulation) -> tuple[float, float]:
+    """Mean number of tools evaluated on a crossing: within reach of an edge, and of the flat face only."""
+    shares = []
+    lengths, kinds = simulation.machine.pieces[:, simulation.sheet.row_index, 1:, 1:].reshape(-1, 2).T
+    counts = simulation.machine.pieces[:, simulation.sheet.row_index, 0, 0].reshape(-1)
+    most = simulation.machine.pieces.shape[2] - 1
+    valid = (np.arange(most)[None, :] < counts[:, None]).reshape(-1)
+    for kind in (TOUCHING, ON_FACE):
+        shares.append(float(lengths[valid & (kinds == kind)].sum()) / (simulation.rows * simulation.columns))
+    return shares[0], shares[1]
 
 
 def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, device: str) -> Timed:
@@ -121,19 +142,22 @@ def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, dev
         simulation.restore(start)
         before = simulation.steps
         began = time.perf_counter()
-        while simulation.steps - before < LAP_STEPS:
-            simulation.advance_to(simulation.time + (LAP_STEPS - simulation.steps + before) * simulation.step)
-        looped = time.perf_counter()
+        for _ in range(LAP_SURVEYS):
+            # half a step less, so that rounding of the time neither adds a step nor splits the batch
+            simulation.advance_to(simulation.time + (SURVEY_EVERY - 0.5) * simulation.step)
+        marched = time.perf_counter()
         simulation.ledger()
+        entered = time.perf_counter()
         Fields(study.grid, study.fabric, simulation.positions).largest_shear()
-        row = time.perf_counter() - looped
+        looked = time.perf_counter()
         made = simulation.steps - before
-        return made, looped - began + row * made * simulation.step / between_rows, looped - began
+        loop = marched - began + (entered - marched) * made / (SURVEY_EVERY * LEDGER_EVERY)
+        row = (looked - marched) * made * simulation.step / between_rows
+        return made, loop + row, loop
 
-    fields = start["fields"]
-    touched = float((simulation._touching > 0).mean(axis=1).sum())
-    work = arithmetic(simulation.layout, touched)
-    return Timed(WEFTFORM, side, threads, contact, device, lap, fields.nbytes / side**2, work)
+    memory = (start["fields"].nbytes + start["grip"].nbytes + simulation.sheet.traits.nbytes) / side**2
+    work = arithmetic(simulation, *contact_shares(simulation))
+    return Timed(WEFTFORM, side, threads, contact, device, lap, memory, work)
 
 
 def reference_case(simulation: Simulation, side: int, contact: bool, everywhere: bool = False) -> Timed:
@@ -147,11 +171,11 @@ def reference_case(simulation: Simulation, side: int, contact: bool, everywhere:
         spent = time.perf_counter() - began
         return LAP_STEPS, spent, spent
 
-    touched = 3.0 if everywhere else float((simulation._touching > 0).mean(axis=1).sum())
-    # its state is positions, velocities and the friction force of each tool, all of them read and written
-    work = arithmetic(simulation.layout, touched) | {"bytes_per_cell_step": 8.0 * (12.0 + 6.0 * touched)}
+    shares = (float(reference.tools), 0.0) if everywhere else contact_shares(simulation)
+    work = arithmetic(simulation, *shares)
+    memory = (reference.state.nbytes + reference.grip.nbytes) / side**2
     name = C_EVERYWHERE if everywhere else C_REFERENCE
-    return Timed(name, side, 1, contact, "cpu", lap, reference.state.nbytes / side**2, work)
+    return Timed(name, side, 1, contact, "cpu", lap, memory, work)
 
 
 def take_laps(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from weftform.errors import WeftformError
 from weftform.solver import Simulation, loop
 from weftform.solver import layout as at
+from weftform.solver.sheet import aligned, inertia_area
 from weftform.solver.simulation import CONTACT_MARGIN, SURVEY_EVERY
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,7 @@ class _Sheet(ctypes.Structure):
         *(
             (name, ctypes.c_void_p)
             for name in (
-                "state", "inverse_mass", "inertia", "area", "inverse_area", "warp_line", "weft_line",
+                "state", "grip", "inverse_mass", "inertia", "area", "warp_line", "weft_line",
                 "warp", "weft", "shear", "series",
             )
         ),
@@ -85,7 +86,7 @@ class Reference:
     simulation
         Where to start; it is not changed.
     everywhere
-        Evaluate contact on all rows, not only on those that can touch.
+        Evaluate contact everywhere, not only on the pieces of rows that can touch.
     flags
         Of the compiler.
 
@@ -97,7 +98,8 @@ class Reference:
 
     def __init__(self, simulation: Simulation, everywhere: bool = False, flags: tuple[str, ...] = FLAGS) -> None:
         layout, grid = simulation.layout, simulation.problem.grid
-        warp, weft, shear = simulation._packed
+        material, machine = simulation.material, simulation.machine
+        warp, weft, shear = material.warp, material.weft, material.shear
         if layout.half_cells or layout.driven or layout.tools not in (0, TOOLS) or not grid.active.all():
             raise ReferenceMissing("the reference knows whole rectangular blanks with three tools or none")
         if warp.pieces * weft.pieces * shear.pieces != 1:
@@ -113,55 +115,52 @@ class Reference:
         self._library = _compile(
             flags,
             STRIDE=self.stride, TOOLS=self.tools, WARP_DEGREE=warp.degree, WEFT_DEGREE=weft.degree,
-            SHEAR_DEGREE=shear.degree, SERIES=len(simulation._series), RESTRICT=int(not everywhere),
+            SHEAR_DEGREE=shear.degree, SERIES=len(material.series), RESTRICT=int(not everywhere),
         )  # fmt: skip
         fields = saved["fields"]
-        self.state = np.zeros((self.rows, 6 + 3 * self.tools, self.stride))
+        self.state = aligned((self.rows, 6, self.stride))
+        self.grip = aligned((self.rows, self.tools, 3, self.stride))
+        self.grip[..., : self.columns] = saved["grip"][..., : self.columns]
         # padding keeps the distances of the flat grid
         self.state[:, 0] = (np.arange(self.stride) * grid.warp_pitch)[None, :] + 1.0e4
         self.state[:, 1] = (np.arange(self.rows) * grid.weft_pitch)[:, None]
         self.state[:, 2] = 1.0e5
         self.state[:, :6, : self.columns] = fields[:, at.POSITION : at.POSITION + 6, : self.columns]
-        for k in range(self.tools):
-            first = layout.tool + k * at.TOOL_FIELDS
-            self.state[:, 6 + 3 * k : 9 + 3 * k, : self.columns] = fields[:, first : first + 3, : self.columns]
         clock = saved["clock"]
         density = simulation.density
         area = self._profile(grid.node_area)
-        inertia = self._profile(simulation.inertia_area)
+        inertia = self._profile(inertia_area(grid))
         with np.errstate(divide="ignore"):
             inverse_mass = np.where(inertia > 0.0, 1.0 / (density * inertia), 0.0)
-            inverse_area = np.where(area > 0.0, 1.0 / area, 0.0)
         column = np.arange(self.stride)
-        membrane, fabric = simulation._membrane, simulation.problem.fabric
+        fabric = simulation.problem.fabric
         settings = simulation.problem.settings
-        ends = simulation._loop_ends
+        ends = material.ends
         self._tool_table = saved["tools"].copy()
         self._poses = saved["poses"].copy()
-        self._touching = np.ones((self.rows, max(self.tools, 1)), np.int8)
+        self._touching = np.zeros((self.rows, at.blocks_for(self.columns)), np.int8)
         self._kept: list[Any] = []
-        self._found = np.zeros(7)
+        self._found = np.zeros(8)
         self._sheet = _Sheet(
-            rows=self.rows, columns=self.columns, state=self._address(self.state),
+            rows=self.rows, columns=self.columns, state=self._address(self.state), grip=self._address(self.grip),
             inverse_mass=self._address(inverse_mass), inertia=self._address(inertia), area=self._address(area),
-            inverse_area=self._address(inverse_area),
             warp_line=self._address((column < self.columns - 1).astype(float)),
             weft_line=self._address((column < self.columns).astype(float)),
             warp=self._address(warp.coefficients), weft=self._address(weft.coefficients),
-            shear=self._address(shear.coefficients), series=self._address(simulation._series),
+            shear=self._address(shear.coefficients), series=self._address(material.series),
             warp_end=tuple(ends[0]), weft_end=tuple(ends[1]), shear_end=tuple(ends[2][:2]),
             warp_pitch=grid.warp_pitch, weft_pitch=grid.weft_pitch,
-            warp_modulus=membrane[2], weft_modulus=membrane[3], hourglass=membrane[4],
+            warp_modulus=material.moduli[0], weft_modulus=material.moduli[1], hourglass=material.membrane[5],
             volume=grid.cell_area * fabric.thickness,
             density=density, damping=settings.damping, viscous=settings.viscosity * grid.cell_area,
             tools=self._address(self._tool_table), poses=self._address(self._poses), touching=self._address(self._touching),
-            times=self._address(simulation._motion_times), values=self._address(simulation._motion_values),
-            knots=self._address(simulation._motion_knots), most_knots=simulation._motion_times.shape[1],
+            times=self._address(machine.times), values=self._address(machine.values),
+            knots=self._address(machine.knots), most_knots=machine.times.shape[1],
             ramp=settings.ramp, time=clock[loop.C_TIME], step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP],
             inertia_factor=clock[loop.C_INERTIA],
         )  # fmt: skip
         self.survey()
-        self._start = [(a, a.copy()) for a in (self.state, self._tool_table, self._poses, self._touching)]
+        self._start = [(a, a.copy()) for a in (self.state, self.grip, self._tool_table, self._poses, self._touching)]
         self._start_time = self._sheet.time
 
     def restart(self) -> None:
@@ -194,7 +193,7 @@ class Reference:
         self._library.advance(ctypes.byref(self._sheet), ctypes.c_int64(steps))
 
     def advance_surveyed(self, steps: int) -> None:
-        """Make steps with a survey after every 64, as the package does."""
+        """Make steps with a survey after every :data:`SURVEY_EVERY`, as the package does."""
         while steps > 0:
             self.advance(min(steps, SURVEY_EVERY))
             self.survey()

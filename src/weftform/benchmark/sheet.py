@@ -17,6 +17,7 @@ from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.contact import rounded_edge
 from weftform.solver import Problem, Simulation, loop
 from weftform.solver import layout as at
+from weftform.solver.simulation import LEDGER_EVERY
 from weftform.study import Study
 
 Floats = NDArray[np.float64]
@@ -90,24 +91,20 @@ def formed_sheet(cells: int, contact: bool, source: Simulation | None = None) ->
     simulation = Simulation(sheet_problem(cells, contact))
     taken, saved = source.checkpoint(), simulation.checkpoint()
     rows, columns = simulation.rows, simulation.columns
-    groups = [(at.POSITION, at.POSITION, 6)]
+    for k in range(at.POSITION, at.POSITION + 6):
+        found = _on_grid(taken["fields"][:, k, : source.columns], rows, columns)
+        if not contact:
+            flat = saved["fields"][:, k, :columns]
+            found = flat + PART_OF_SHAPE * (found - flat)
+        saved["fields"][:, k, :columns] = found
     if contact:
-        groups += [
-            (source.layout.tool + k * at.TOOL_FIELDS, simulation.layout.tool + k * at.TOOL_FIELDS, 3)
-            for k in range(simulation.layout.tools)
-        ]
         for name in ("poses", "tools"):
             saved[name] = taken[name]
-    for first, here, count in groups:
-        # forces of crossings go with the area they stand for
-        share = 1.0 if first == at.POSITION else (source.rows - 1) * (source.columns - 1) / ((rows - 1) * (columns - 1))
-        for k in range(count):
-            field = taken["fields"][:, first + k, : source.columns]
-            found = share * _on_grid(field, rows, columns)
-            if not contact:
-                flat = saved["fields"][:, here + k, :columns]
-                found = flat + PART_OF_SHAPE * (found - flat)
-            saved["fields"][:, here + k, :columns] = found
+        for tool in range(len(simulation.problem.tools)):
+            for c in range(3):
+                saved["grip"][:, tool, c, :columns] = _on_grid(
+                    taken["grip"][:, tool, c, : source.columns], rows, columns
+                )
     if contact:
         # what the cells of the source cut off at fillets would be thrown out by the finer sheet's contact
         for _ in range(PUSHES):
@@ -119,6 +116,9 @@ def formed_sheet(cells: int, contact: bool, source: Simulation | None = None) ->
     settled = simulation.steps + SETTLING
     while simulation.steps < settled:
         simulation.advance_to(simulation.time + 64 * simulation.step)
+    # past the short batches of a start, and just after an entry of the ledger
+    late = simulation.checkpoint() | {"surveys": taken["surveys"] // LEDGER_EVERY * LEDGER_EVERY}
+    simulation.restore(late)
     return simulation
 
 

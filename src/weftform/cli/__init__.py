@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 
+from weftform import __version__
 from weftform.cli.bodies import VERBS
 from weftform.cli.characterise import app as characterise
 from weftform.errors import WeftformError
@@ -19,6 +21,22 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"weftform {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def before_any_verb(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """What may stand before the verb."""
+
 
 for name, body in VERBS.items():
     app.command(name)(body)

@@ -8,7 +8,9 @@ from typing import Any
 from weftform.cli.bench import bench
 from weftform.cli.cards import cards
 from weftform.cli.check import check
+from weftform.cli.compare import compare
 from weftform.cli.doctor import doctor
+from weftform.cli.identify import identify
 from weftform.cli.new import new
 from weftform.cli.probe import probe
 from weftform.cli.reproduce import reproduce
@@ -22,8 +24,10 @@ VERBS: dict[str, Callable[..., Any]] = {
     "run": run,
     "view": view,
     "probe": probe,
+    "compare": compare,
     "studies": studies,
     "cards": cards,
+    "identify": identify,
     "reproduce": reproduce,
     "bench": bench,
     "doctor": doctor,

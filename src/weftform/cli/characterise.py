@@ -34,6 +34,7 @@ from weftform.cli.characterise_options import (
     Weighting,
     WeightingChoice,
     Zero,
+    count_of,
     defaults_of,
     figure_folder,
     interval_of,
@@ -107,9 +108,7 @@ def tensile(
             knots=knots,
             reading=reading_of(preset, column, unit, only, zero),
         )
-        typer.echo(
-            f"Tensile test along the {direction.value}: {len(found.specimens)} specimens, {found.fit.points} points"
-        )
+        typer.echo(f"Tensile test along the {direction.value}: {count_of(found.specimens)}, {found.fit.points} points")
         s = found.stages
         typer.echo(
             f"  crimp to {s.crimp_end:.3f} mm, linear to {s.linear_end:.3f} mm at {s.linear_stiffness:.5g} "
@@ -206,7 +205,7 @@ def bias_extension(
             reading=reading_of(preset, column, unit, only, zero),
         )
         typer.echo(
-            f"Bias-extension test {height:g} x {width:g} mm: {len(found.specimens)} specimens, "
+            f"Bias-extension test {height:g} x {width:g} mm: {count_of(found.specimens)}, "
             f"{found.shear.fit.points} points, {found.angle_source} angle"
         )
         if found.slip is not None:
@@ -290,8 +289,7 @@ def picture_frame(
             reading=reading_of(preset, column, unit, only, zero),
         )
         typer.echo(
-            f"Picture-frame test, {found.measured} data: {len(found.specimens)} specimens, "
-            f"{found.shear.fit.points} points"
+            f"Picture-frame test, {found.measured} data: {count_of(found.specimens)}, {found.shear.fit.points} points"
         )
         say_shear(found.shear, "N/mm" if found.measured == "normalised" else "N")
         say_warnings(found.warnings)
@@ -312,3 +310,36 @@ def picture_frame(
             from weftform.laboratory.figures import draw_picture_frame
 
             say_files(draw_picture_frame(found, folder))
+
+
+@app.command("shear-map")
+def shear_map(
+    file: Annotated[Path, typer.Argument(help="Full-field export of one stage: positions and displacements.")],
+    warp_deg: Annotated[float, typer.Option("--warp-deg", help="Direction of the warp from the x axis [deg].")] = 45.0,
+    png: Annotated[Path | None, typer.Option("--png", help="Picture to write (default: FILE-shear.png here).")] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Table to write: x_mm, y_mm and shear_angle_deg of each triangle.")
+    ] = None,
+    preset: Preset = "auto",
+    column: Columns = None,
+    unit: Units = None,
+) -> None:
+    """Shear-angle map of a full-field (DIC) export: GOM Aramis, VIC-3D or generic."""
+    with reported():
+        from weftform.laboratory.figures import draw_shear_field
+        from weftform.laboratory.full_field import read_shear_field
+        from weftform.result.writer import write_whole
+
+        field = read_shear_field(file, warp_deg=warp_deg, reading=reading_of(preset, column, unit, None, False))
+        typer.echo(
+            f"Shear angle of {file.name}: {len(field.angle)} triangles, mean {field.angle.mean():.2f} deg, from "
+            f"{field.angle.min():.2f} to {field.angle.max():.2f} deg"
+        )
+        say_warnings(field.warnings)
+        if table is not None:
+            rows = zip(field.x, field.y, field.angle, strict=True)
+            write_whole(
+                table, "x_mm,y_mm,shear_angle_deg\n" + "".join(f"{x:.4f},{y:.4f},{g:.4f}\n" for x, y, g in rows)
+            )
+            typer.echo(f"  table {table}")
+        say_files([draw_shear_field(field, Path(f"{file.stem}-shear.png") if png is None else png, file.name)])

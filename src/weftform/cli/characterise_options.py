@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from weftform.cli.options import pairs_of
 from weftform.errors import MeasurementError, WeftformError
 
 if TYPE_CHECKING:
@@ -106,16 +107,9 @@ def reported() -> Iterator[None]:
     except WeftformError as problem:
         typer.echo(str(problem), err=True)
         raise typer.Exit(problem.exit_code) from None
-
-
-def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, str]:
-    pairs = {}
-    for text in texts or ():
-        key, equals, value = text.partition("=")
-        if not (equals and key.strip() and value.strip()):
-            raise MeasurementError(f"{option} {text} is not of the form QUANTITY=VALUE", expected=f"{option} force=...")
-        pairs[key.strip()] = value.strip()
-    return pairs
+    except OSError as problem:
+        typer.echo(f"{problem.filename}: cannot be written ({problem.strerror})", err=True)
+        raise typer.Exit(2) from None
 
 
 def reading_of(
@@ -127,7 +121,13 @@ def reading_of(
 ) -> Reading:
     from weftform.laboratory import Reading
 
-    return Reading(preset, _pairs(column, "--column"), _pairs(unit, "--unit"), tuple(only or ()), zero)
+    return Reading(
+        preset,
+        pairs_of(column, "--column", "force=HEADER"),
+        pairs_of(unit, "--unit", "force=kN"),
+        tuple(only or ()),
+        zero,
+    )
 
 
 def interval_of(start: float | None, end: float | None) -> tuple[float, float] | None:
@@ -245,6 +245,10 @@ def say_shear(shear: ShearCurve, residual: str = "N") -> None:
     locking = f"{shear.stages.locking_deg:.1f} deg" if shear.stages.locking_deg is not None else "not reached"
     typer.echo(f"  placing to {shear.stages.placing_end_deg:.1f} deg, locking angle {locking}")
     typer.echo(f"    ({shear.stages.criterion})")
+
+
+def count_of(specimens: Sequence[object]) -> str:
+    return f"{len(specimens)} specimen{'' if len(specimens) == 1 else 's'}"
 
 
 def say_warnings(warnings: Sequence[str]) -> None:

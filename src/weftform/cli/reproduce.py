@@ -20,7 +20,7 @@ def reproduce(
 ) -> None:
     """Run everything the paper reports, print it beside the paper's numbers and write reproduction.md and .json.
 
-    Takes a minute or two on two cores. Exits 1 where an item that must agree does not.
+    Takes a few minutes on two cores. Exits 1 where an item that must agree does not.
     """
     from rich.console import Console
     from rich.table import Table

@@ -55,6 +55,8 @@ def run(
         typer.echo(f"figures    {len(drawn)} in {folder / 'figures'} ({time.perf_counter() - begun:.1f} s)")
         typer.echo(f"picture    {drawn[0]}")
     typer.echo(f"results    {folder} (open fields.vtkhdf in ParaView)")
+    for note in summary["notes"]:
+        typer.secho(f"note       {note}", fg="yellow", err=True)
     for warning in summary["warnings"]:
         typer.secho(f"warning    {warning}", fg="red", err=True)
     if not summary["ok"]:

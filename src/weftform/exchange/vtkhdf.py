@@ -47,6 +47,7 @@ class Series:
     ) -> None:
         self.points = points
         self.cells = len(offsets) - 1
+        self._found: dict[str, Any] = {}
         if resume:
             self._file = h5py.File(path, "r+")
             self._root = self._file["VTKHDF"]
@@ -107,31 +108,36 @@ class Series:
     ) -> None:
         """Write one step: positions [points, 3] and fields with one row per point or cell."""
         root, steps, n = self._root, self._root["Steps"], self.steps
-        _extend(root["Points"], points)
+        self._extend("VTKHDF/Points", n * self.points, points)
         for name, value in scalars.items():
-            _extend(self._file[name], np.array([value]))
+            self._extend(name, n, np.array([value]))
         for kind, fields in (("PointData", point_data), ("CellData", cell_data)):
             for name, values in fields.items():
-                if name not in root[kind]:
+                if n == 0:
                     self._growing(root[kind], name, 1 if values.ndim == 1 else values.shape[1], len(values))
                     steps[f"{kind}Offsets"].create_dataset(name, (0,), np.int64, maxshape=(None,), chunks=(64,))
-                _extend(steps[f"{kind}Offsets"][name], np.array([root[kind][name].shape[0]]))
-                _extend(root[kind][name], values)
-        _extend(steps["Values"], np.array([time]))
-        _extend(steps["PartOffsets"], np.array([0]))
-        _extend(steps["NumberOfParts"], np.array([1]))
-        _extend(steps["PointOffsets"], np.array([n * self.points]))
-        _extend(steps["CellOffsets"], np.array([[0]]))
-        _extend(steps["ConnectivityIdOffsets"], np.array([[0]]))
+                self._extend(f"VTKHDF/Steps/{kind}Offsets/{name}", n, np.array([n * len(values)]))
+                self._extend(f"VTKHDF/{kind}/{name}", n * len(values), values)
+        for name, number in (
+            ("Values", time),
+            ("PartOffsets", 0),
+            ("NumberOfParts", 1),
+            ("PointOffsets", n * self.points),
+        ):
+            self._extend(f"VTKHDF/Steps/{name}", n, np.array([number]))
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            self._extend(f"VTKHDF/Steps/{name}", n, np.array([[0]]))
         steps.attrs["NSteps"] = np.int64(n + 1)
         self._file.flush()
+
+    def _extend(self, name: str, start: int, values: NDArray[Any]) -> None:
+        """Write rows of a dataset from ``start`` on; what lay there belongs to a step that was never completed."""
+        if name not in self._found:
+            self._found[name] = self._file[name]
+        dataset = self._found[name]
+        dataset.resize(start + len(values), axis=0)
+        dataset[start:] = values
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-def _extend(dataset: Any, values: NDArray[Any]) -> None:
-    start = dataset.shape[0]
-    dataset.resize(start + len(values), axis=0)
-    dataset[start:] = values

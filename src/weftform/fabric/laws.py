@@ -189,11 +189,15 @@ class Monotony:
     steepest_fall: float
 
 
+ROUNDING = 1e-12
+"""Share of the steepest slope below which a fall is rounding: a rising table may end level."""
+
+
 def first_fall(law: Law, upper: float, samples: int = 4001) -> Monotony | None:
     """First interval of ``(0, upper]`` where the law falls, or None if it rises throughout."""
     x = np.linspace(0.0, upper, samples)[1:]
     slope = law.slope(x)
-    falling = slope < 0.0
+    falling = slope < -ROUNDING * float(np.abs(slope).max())
     if not falling.any():
         return None
     first = int(np.argmax(falling))

@@ -21,17 +21,19 @@ from weftform.laboratory.kinematics import (
     kinematic_limit,
 )
 from weftform.laboratory.markers import MarkerTracking
-from weftform.laboratory.measured_angle import MeasuredAngle
+from weftform.laboratory.measured_angle import MeasuredAngle, measured_angles, slip_in_bias
 from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
 from weftform.laboratory.shear import ShearCurve
-from weftform.laboratory.slip import SlipOnset, slip_onset
+from weftform.laboratory.slip import SlipOnset
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
 from weftform.laboratory.stages import LockingCriterion, shear_stages
 from weftform.laboratory.tabulating import TableFit, fit_table
 from weftform.laboratory.tensile import LawKind, fit_warnings
 
 AngleSource = Literal["auto", "kinematic", "measured"]
+LEAST_TRAVEL_DEG = 1.0
+"""Kinematic angle that a bias-extension test reaches at least; one that ends before was read in wrong units."""
 ANGLE_DRAWS = 30
 """Times that a measured angle is drawn again from its noise, to see what it does to the law."""
 LARGEST_KINEMATIC_DEG = 60.0
@@ -162,11 +164,8 @@ def characterise_bias_extension(
     warnings = [w for s in specimens for w in s.warnings] + [w for t in tracking for w in t.warnings]
     _check_travel(specimens, height, width)
     mean = average(specimens)
-    measured = _measured(specimens, tracking)
-    slip = None
-    if measured is not None:
-        d, g = (v[measured[0] < kinematic_limit(height, width)] for v in measured)
-        slip = slip_onset(d, g, np.degrees(kinematic_angle(d, height, width)))
+    measured = measured_angles(specimens, tracking)
+    slip = None if measured is None else slip_in_bias(*measured, height, width)
     source: Literal["kinematic", "measured"]
     if angle == "auto":
         source = "measured" if slip is not None and slip.found else "kinematic"
@@ -285,8 +284,9 @@ def _fit(
 
 
 def _check_travel(specimens: Sequence[Specimen], height: float, width: float) -> None:
-    """A bias specimen cannot be pulled to twice the length at which its yarns are parallel."""
+    """A bias specimen is pulled by more than nothing, and not to twice the length at which its yarns are parallel."""
     most = 2.0 * kinematic_limit(height, width)
+    least = float(kinematic_displacement(np.radians(LEAST_TRAVEL_DEG), height, width))
     for s in specimens:
         if s.x[-1] > most:
             raise MeasurementError(
@@ -298,21 +298,16 @@ def _check_travel(specimens: Sequence[Specimen], height: float, width: float) ->
                 got=f"{s.x[-1]:.6g} mm",
                 hint="are displacement and force swapped, or the units wrong?",
             )
-
-
-def _measured(specimens: Sequence[Specimen], tracking: Sequence[MarkerTracking]) -> tuple[Floats, Floats] | None:
-    """All measured angles of zone B: marker trackings, else the angle column of the specimens."""
-    pairs = [(t.displacement, t.zone("B").mean) for t in tracking]
-    if not pairs:
-        pairs = [(s.x, s.angle) for s in specimens if s.angle is not None]
-    if not pairs:
-        return None
-    displacement, angle = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    ok = np.isfinite(angle)
-    if ok.sum() < 2:
-        return None
-    order = np.argsort(displacement[ok], kind="stable")
-    return displacement[ok][order], angle[ok][order]
+        if s.x[-1] < least:
+            raise MeasurementError(
+                f"{s.name}: the test ends at {s.x[-1]:.4g} mm, before a bias-extension specimen of {height:g} x {width:g} mm "
+                "has sheared at all",
+                file=s.file,
+                line=int(s.lines[-1]),
+                expected=f"at least {least:.3g} mm ({LEAST_TRAVEL_DEG:g} deg)",
+                got=f"{s.x[-1]:.6g} mm",
+                hint="is the displacement in metres or in inches? --unit displacement=m",
+            )
 
 
 def _end_of_interval(

@@ -147,7 +147,7 @@ def write_card(
             hint="; ".join(f"{'.'.join(place)}: {how}" for place, how in missing)
             + "; or take them all from a card: --from CARD",
         )
-    return _commit(output, tomlkit.dumps(document))
+    return _commit(output, tomlkit.dumps(document).rstrip("\n") + "\n")
 
 
 def existing_value(output: Path | None, base: str | Path | None, place: tuple[str, ...]) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from weftform.fabric.laws import Floats
 from weftform.laboratory.bias_extension import BiasExtensionCharacterisation
 from weftform.laboratory.fitting import Band
+from weftform.laboratory.full_field import ShearField
 from weftform.laboratory.kinematics import kinematic_angle, kinematic_limit
 from weftform.laboratory.picture_frame import PictureFrameCharacterisation
 from weftform.laboratory.shear import ShearCurve
@@ -23,6 +24,33 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED, MEAN, LAW, SECOND, THIRD = "0.6", "0.15", "#0057b8", "#c8102e", "#1b7f3b"
+
+
+def draw_shear_field(field: ShearField, file: Path, source: str) -> Path:
+    """Map of the shear angle on the undeformed specimen, from a full-field measurement; returns the file."""
+    from matplotlib.collections import PolyCollection
+
+    size = np.ptp(field.corners.reshape(-1, 2), axis=0)
+    figure, axes = _page(
+        "x (mm)",
+        "y (mm)",
+        f"Shear angle from the displacements of {source}, drawn on the undeformed cloth: {len(field.angle)} triangles, mean "
+        f"{field.angle.mean():.2f} deg, standard deviation {field.angle.std():.2f} deg.",
+    )
+    low, high = np.percentile(field.angle, [1.0, 99.0])
+    if high - low < 1.0:  # a uniform field: noise is not blown up to all colours
+        low, high = 0.5 * (low + high) - 0.5, 0.5 * (low + high) + 0.5
+    cells = PolyCollection(list(field.corners), array=field.angle, cmap="viridis", edgecolors="face", linewidths=0.2)
+    cells.set_clim(low, high)
+    axes.add_collection(cells)
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.grid(False)
+    bar = figure.colorbar(cells, ax=axes, extend="both", shrink=0.9 if size[1] >= size[0] else 0.6)
+    bar.set_label("Shear angle (deg)")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file)
+    return file
 
 
 def draw_tensile(found: TensileCharacterisation, folder: Path) -> list[Path]:

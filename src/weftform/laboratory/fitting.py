@@ -17,6 +17,7 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats, PolynomialLaw
 from weftform.laboratory.monotone import power_basis, rising_coefficients
+from weftform.laboratory.scatter import neighbour_correlation, student
 
 Weighting = Literal["uniform", "relative"]
 SIMULATIONS = 4000
@@ -148,7 +149,7 @@ class PolynomialFit:
         error = np.sqrt(np.maximum(np.maximum(scatter, noise), 0.0) + (common**2).sum(axis=0))
         key = (kind, level, simultaneous, x.tobytes())
         if key not in self._critical:
-            self._critical[key] = self._simultaneous(basis, level) if simultaneous else _student(level, self.freedom)
+            self._critical[key] = self._simultaneous(basis, level) if simultaneous else student(level, self.freedom)
         critical = self._critical[key]
         centre = basis @ self.coefficients
         return Band(
@@ -172,7 +173,7 @@ class PolynomialFit:
             size = np.maximum((between**2).sum(axis=0), floor)
             used = size > 1e-24 * max(float(size.max()), 1e-300)
             if not used.any():
-                return _student(level, self.freedom)
+                return student(level, self.freedom)
             curves = np.vstack([between, noise])[:, used]
             draws = rng.standard_normal((SIMULATIONS, n, len(curves))) @ curves
             error, variance = draws.mean(axis=1), draws.var(axis=1, ddof=1) / n
@@ -188,16 +189,10 @@ class PolynomialFit:
             length = np.linalg.norm(curves, axis=1)
             curves = curves[length > 0.0] / length[length > 0.0, None]
             if not curves.size:
-                return _student(level, self.freedom)
+                return student(level, self.freedom)
             chi = np.sqrt(rng.chisquare(self.freedom, SIMULATIONS) / self.freedom)
             ratio = np.abs(rng.standard_normal((SIMULATIONS, len(root))) @ curves.T) / chi[:, None]
         return float(np.quantile(ratio.max(axis=1), level))
-
-
-def _student(level: float, freedom: int) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.5 + 0.5 * level, freedom))
 
 
 def fit_polynomial(
@@ -332,7 +327,5 @@ def _noise(rows: list[Floats], values: list[Floats], free: Floats, deviations: F
 
 def _inflation(residual: Floats) -> float:
     """Variance inflation of residuals with lag-one correlation r: (1 + r) / (1 - r), never below 1."""
-    total = float(residual @ residual)
-    r = float(residual[1:] @ residual[:-1]) / total if total > 0.0 else 0.0
-    r = min(max(r, 0.0), 0.98)
+    r = neighbour_correlation(residual)
     return (1.0 + r) / (1.0 - r)

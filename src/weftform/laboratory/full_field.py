@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +24,17 @@ class ShearField:
         Undeformed centres of the triangles [mm], shape [n].
     angle
         Shear angle [deg], shape [n]; positive where the angle between warp and weft closes.
+    corners
+        Undeformed corners of the triangles [mm], shape [n, 3, 2].
+    warnings
+        What was done to the measurement.
     """
 
     x: Floats
     y: Floats
     angle: Floats
+    corners: Floats
+    warnings: tuple[str, ...] = ()
 
 
 def shear_field(
@@ -84,7 +90,7 @@ def shear_field(
     weft = gradient @ np.array([-np.sin(t), np.cos(t)])
     cosine = (warp * weft).sum(axis=1) / (np.linalg.norm(warp, axis=1) * np.linalg.norm(weft, axis=1))
     centre = corner.mean(axis=1)
-    return ShearField(centre[:, 0], centre[:, 1], np.degrees(np.arcsin(np.clip(cosine, -1.0, 1.0))))
+    return ShearField(centre[:, 0], centre[:, 1], np.degrees(np.arcsin(np.clip(cosine, -1.0, 1.0))), corner)
 
 
 def read_shear_field(
@@ -106,4 +112,7 @@ def read_shear_field(
     t = read_table(file, needed, may_miss=needed, preset=reading.preset, columns=reading.columns, units=reading.units)
     x, y, u, v = (t.values[q] for q in needed)
     ok = np.isfinite(x) & np.isfinite(y) & np.isfinite(u) & np.isfinite(v)
-    return shear_field(x[ok], y[ok], u[ok], v[ok], warp_deg=warp_deg)
+    warnings = t.warnings
+    if not ok.all():
+        warnings = (*warnings, f"{t.file.name}: {int((~ok).sum())} of {len(ok)} points lost by the system are left out")
+    return replace(shear_field(x[ok], y[ok], u[ok], v[ok], warp_deg=warp_deg), warnings=warnings)

@@ -226,7 +226,7 @@ def track_markers(
     images = tuple(dict.fromkeys(table.names[Quantity.IMAGE]))
     travel = _displacements(table, images, displacements, reading)
     markers = sorted({m for q in layout.quadruple for m in q.markers})
-    xyz = _positions(table, images, markers)
+    xyz = positions_by_image(table, images, markers)
     warnings = [*table.warnings, *_lost(table, images, markers, xyz)]
     order = np.argsort(travel, kind="stable")
     if (order != np.arange(len(order))).any():
@@ -288,20 +288,31 @@ def _displacements(table: MeasuredTable, images: tuple[str, ...], file: Path | s
     return np.array([known[i] for i in images], float)
 
 
-def _positions(table: MeasuredTable, images: tuple[str, ...], markers: list[str]) -> Floats:
+def positions_by_image(table: MeasuredTable, images: Sequence[str], markers: Sequence[str]) -> Floats:
+    """Positions of markers [mm], shape [images, markers, 2 or 3]; NaN where a marker is lost.
+
+    A table without a column of images is one image, whatever its name.
+
+    Raises
+    ------
+    MeasurementError
+        A marker stands twice in an image.
+    """
     spatial = Quantity.Z in table.values
     axes = [Quantity.X, Quantity.Y, *([Quantity.Z] if spatial else [])]
     xyz = np.full((len(images), len(markers), len(axes)), np.nan)
     where_image = {name: k for k, name in enumerate(images)}
     where_marker = {name: k for k, name in enumerate(markers)}
     filled: set[tuple[int, int]] = set()
-    for row, (image, marker) in enumerate(zip(table.names[Quantity.IMAGE], table.names[Quantity.MARKER], strict=True)):
+    named = table.names[Quantity.MARKER]
+    shown = table.names.get(Quantity.IMAGE, (images[0],) * len(named))
+    for row, (image, marker) in enumerate(zip(shown, named, strict=True)):
         if marker not in where_marker:
             continue
         place = (where_image[image], where_marker[marker])
         if place in filled:
             raise MeasurementError(
-                f"marker {marker} appears twice in image {image}",
+                f"marker {marker} appears twice" + (f" in image {image}" if Quantity.IMAGE in table.names else ""),
                 file=table.file,
                 line=int(table.lines[row]),
                 expected="one row per marker and image",

@@ -7,16 +7,40 @@ what "no slip" means.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from weftform.fabric.laws import Floats
-from weftform.laboratory.kinematics import kinematic_angle
-from weftform.laboratory.slip import SlipOnset
+from weftform.laboratory.kinematics import kinematic_angle, kinematic_limit
+from weftform.laboratory.markers import MarkerTracking
+from weftform.laboratory.slip import SlipOnset, slip_onset
+from weftform.laboratory.specimen import Specimen
 
 ANCHOR = 1.0e3
 """Weight with which the measured branch is tied to the kinematic angle at the onset of slip."""
+
+
+def measured_angles(specimens: Sequence[Specimen], tracking: Sequence[MarkerTracking]) -> tuple[Floats, Floats] | None:
+    """Displacements [mm] and angles of zone B [deg], in order: of the markers, else of the angle columns; None without."""
+    pairs = [(t.displacement, t.zone("B").mean) for t in tracking]
+    if not pairs:
+        pairs = [(s.x, s.angle) for s in specimens if s.angle is not None]
+    if not pairs:
+        return None
+    displacement, angle = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    ok = np.isfinite(angle)
+    if ok.sum() < 2:
+        return None
+    order = np.argsort(displacement[ok], kind="stable")
+    return displacement[ok][order], angle[ok][order]
+
+
+def slip_in_bias(displacement: Floats, angle_deg: Floats, height: float, width: float) -> SlipOnset:
+    """Onset of slip in a bias test, from angles measured while the yarns without slip would not be parallel."""
+    d, g = (v[displacement < kinematic_limit(height, width)] for v in (displacement, angle_deg))
+    return slip_onset(d, g, np.degrees(kinematic_angle(d, height, width)))
 
 
 @dataclass(frozen=True, eq=False)

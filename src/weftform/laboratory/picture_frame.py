@@ -140,12 +140,13 @@ def characterise_picture_frame(
     mean = average(curves)
     peak = int(np.argmax(mean.mean))
     if interval_deg is None:
-        start, end = 0.0, float(mean.x[peak])
-        if peak < len(mean.x) - 1:
-            warnings.append(f"the mean force falls beyond {end:.4g} deg; the law ends there")
-        elif max(float(s.x[-1]) for s in curves) > 1.02 * end:
+        # the mean is known on a grid, and its peak may lie anywhere up to the next place
+        start, end = 0.0, float(mean.x[min(peak + 1, len(mean.x) - 1)])
+        falls = peak < len(mean.x) - 2
+        if not falls and max(float(s.x[-1]) for s in curves) > 1.02 * end:
             warnings.append(f"not every specimen goes beyond {end:.4g} deg; the law ends there (--to-deg moves it)")
     else:
+        falls = False
         start, end = interval_deg
     if not 0.0 <= start < end < 90.0:
         raise MeasurementError(
@@ -164,6 +165,8 @@ def characterise_picture_frame(
         raise MeasurementError("no points in the interval", expected=f"shear angles in {start:.4g}-{end:.4g} deg")
     reached = max(float(g.max()) for g in xs)
     end = min(end, float(np.degrees(reached)))
+    if falls:
+        warnings.append(f"the mean force falls beyond {end:.4g} deg; the law ends there")
 
     def design(g: Floats, basis: Callable[[Floats], Floats]) -> Floats:
         factor = np.ones(len(g)) if kind == "normalised" else frame_lever(g, frame_side, fabric_side)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from weftform.errors import MeasurementError
-from weftform.laboratory.units import Dimension
+from weftform.laboratory.units import Dimension, split_unit
 
 
 class Quantity(Enum):
@@ -27,12 +27,15 @@ class Quantity(Enum):
     X = "x_mm"
     Y = "y_mm"
     Z = "z_mm"
+    U = "u_mm"
+    V = "v_mm"
     SHIFT_X = "shift_x_mm"
     SHIFT_Y = "shift_y_mm"
     SHIFT_Z = "shift_z_mm"
     STRAIN_XX = "strain_xx"
     STRAIN_YY = "strain_yy"
     STRAIN_XY = "strain_xy"
+    SCATTER = "scatter_deg"
     IMAGE = "image"
     MARKER = "marker"
     SPECIMEN = "specimen"
@@ -57,12 +60,15 @@ _DIMENSIONS: dict[Quantity, Dimension] = {
     Quantity.X: Dimension.LENGTH,
     Quantity.Y: Dimension.LENGTH,
     Quantity.Z: Dimension.LENGTH,
+    Quantity.U: Dimension.LENGTH,
+    Quantity.V: Dimension.LENGTH,
     Quantity.SHIFT_X: Dimension.LENGTH,
     Quantity.SHIFT_Y: Dimension.LENGTH,
     Quantity.SHIFT_Z: Dimension.LENGTH,
     Quantity.STRAIN_XX: Dimension.RATIO,
     Quantity.STRAIN_YY: Dimension.RATIO,
     Quantity.STRAIN_XY: Dimension.RATIO,
+    Quantity.SCATTER: Dimension.ANGLE,
     Quantity.IMAGE: Dimension.NONE,
     Quantity.MARKER: Dimension.NONE,
     Quantity.SPECIMEN: Dimension.NONE,
@@ -142,7 +148,7 @@ class Preset:
             for quantity, names in spellings.items():
                 if name in names:
                     return quantity
-        return None
+        return next((q for q in Quantity if name == plain(split_unit(q.value)[0])), None)
 
 
 def plain(header: str) -> str:
@@ -198,6 +204,16 @@ VIC3D = Preset(
     | dict.fromkeys((Quantity.STRAIN_XX, Quantity.STRAIN_YY, Quantity.STRAIN_XY), "1"),
     signs=("exx", "vic-3d"),
 )
+FORMED = Preset(
+    "formed",
+    {
+        Quantity.U: ("u", "warp coordinate", "along warp"),
+        Quantity.V: ("v", "weft coordinate", "along weft"),
+        Quantity.MARKER: ("name", "id"),
+        Quantity.SCATTER: ("scatter", "angle scatter", "deviation", "standard deviation", "std", "sd", "uncertainty"),
+    },
+)
+"""Points of a formed part: ``u`` and ``v`` are material coordinates here, not displacements."""
 PRESETS: dict[str, Preset] = {p.name: p for p in (GENERIC, INSTRON, ARAMIS, VIC3D)}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from weftform.errors import MeasurementError
 from weftform.fabric.laws import Floats
 from weftform.laboratory.presets import Quantity
+from weftform.laboratory.scatter import neighbour_misses
 from weftform.laboratory.table import MeasuredTable, read_table
 
 FEWEST_POINTS = 8
@@ -21,6 +22,12 @@ CLIPPED_ROWS = 5
 CLIPPED_TRAVEL = 0.02
 """A load cell is clipped where the largest force repeats exactly over so many rows and this share of the
 travel."""
+SPIKE_OF_NOISE = 10.0
+SPIKE_OF_FORCE, SPIKE_OF_VALUE = 0.05, 0.5
+"""A point stands alone where it leaves the median of itself and its four neighbours by so many times the noise of the
+curve, and by this share of the largest force or of that median."""
+MOST_SPIKES = 0.02
+"""Share of the rows that may stand alone; with more it is noise, not an error of single rows."""
 LIKE_EACH_OTHER = 5.0
 """Largest ratio between the forces of one specimen and the median specimen; beyond it units or tests are
 mixed."""
@@ -197,6 +204,7 @@ def clean(specimen: Specimen, x_name: str, y_name: str, *, zero: bool = False, g
     if zero:
         s = replace(s, x=s.x - s.x[0], y=s.y - s.y[0])
     s = _rising(s, x_name)
+    s = _without_spikes(s, y_name)
     s = _without_clipping(s, y_name)
     if len(s.x) < FEWEST_POINTS:
         raise MeasurementError(
@@ -288,6 +296,32 @@ def _rising(s: Specimen, x_name: str) -> Specimen:
     lost = s.lines[~forward]
     shown = ", ".join(map(str, lost[:5])) + (f" and {len(lost) - 5} more" if len(lost) > 5 else "")
     return s.part(forward, f"{s.name}: {len(lost)} rows in which {x_name} does not increase left out (line {shown})")
+
+
+def _without_spikes(s: Specimen, y_name: str) -> Specimen:
+    """The curve without single points far from their neighbours: a lost sample, a knock, a spark.
+
+    Far both from the running median, which leaves every rising curve as it is, so that only points out of order depart
+    from it, and from the straight line between the two neighbours. A drop that lasts (yarns that break) stays.
+
+    References
+    ----------
+    Hampel (1974), The influence curve and its role in robust estimation, Journal of the American Statistical
+    Association 69:383-393.
+    """
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(s.y, 5), axis=1)
+    departure = np.append(np.insert(np.abs(s.y[2:-2] - middle), 0, [0.0, 0.0]), [0.0, 0.0])
+    miss = np.pad(np.abs(neighbour_misses(s.x, s.y)[0]), 1)
+    noise = 1.4826 * float(np.median(miss[1:-1]))
+    local = np.pad(np.abs(middle), 2, constant_values=np.inf)
+    least = np.minimum(SPIKE_OF_FORCE * float(np.abs(middle).max()), SPIKE_OF_VALUE * local)
+    least = np.maximum(least, SPIKE_OF_NOISE * noise)
+    alone = (departure > least) & (miss > least)
+    if not alone.any() or alone.sum() > max(1.0, MOST_SPIKES * len(s.y)):
+        return s
+    shown = ", ".join(f"{line} ({y:.4g})" for line, y in list(zip(s.lines[alone], s.y[alone], strict=True))[:5])
+    more = f" and {int(alone.sum()) - 5} more" if alone.sum() > 5 else ""
+    return s.part(~alone, f"{s.name}: {y_name} stands alone among its neighbours and is left out: line {shown}{more}")
 
 
 def _without_clipping(s: Specimen, y_name: str) -> Specimen:

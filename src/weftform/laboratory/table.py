@@ -78,7 +78,7 @@ def read_table(
     *,
     optional: Sequence[Quantity] = (),
     may_miss: Sequence[Quantity] = (),
-    preset: str = "auto",
+    preset: str | Preset = "auto",
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
 ) -> MeasuredTable:
@@ -96,7 +96,7 @@ def read_table(
         Quantities of which single values may be missing (they become NaN); a row that misses any other is
         left out and named.
     preset
-        ``auto``, ``generic``, ``instron``, ``aramis`` or ``vic3d``.
+        ``auto``, ``generic``, ``instron``, ``aramis`` or ``vic3d``, or spellings of one's own.
     columns
         Header (or number, 1 = first) of the column of a quantity: ``{"force": "Load 2"}``.
     units
@@ -111,7 +111,7 @@ def read_table(
     path = Path(file)
     text = cut(path)
     words = " ".join(" ".join(row.cells) for row in text.rows[:40]).lower()
-    found = find_preset(preset, words)
+    found = preset if isinstance(preset, Preset) else find_preset(preset, words)
     wanted = {quantity_named(k): v for k, v in (columns or {}).items()}
     given = {quantity_named(k): v for k, v in (units or {}).items()}
     warnings: list[str] = []

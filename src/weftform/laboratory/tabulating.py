@@ -8,7 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from weftform.errors import MeasurementError
-from weftform.fabric.laws import Floats, TabulatedLaw, first_fall
+from weftform.fabric.laws import Floats, TabulatedLaw
+
+FIRST_KNOT = 0.01
+"""Share of the range within which the first knot lies, where there are points so near to the origin: dry friction
+lets a shear test start with a step, which a first knot further off would smear over the first degrees."""
 
 Design = Callable[[Floats, Callable[[Floats], Floats]], Floats]
 """From the points of a specimen and a basis to the linear map from coefficients to measured values."""
@@ -53,7 +57,8 @@ def fit_table(
     is level.
 
     The unknowns are the increments from knot to knot, none negative: non-negative least squares, with every
-    specimen of the same weight. Knots are spread so that as many points lie between any two.
+    specimen of the same weight. Knots are spread so that as many points lie between any two, but for the first,
+    which lies near the origin (:data:`FIRST_KNOT`).
 
     Raises
     ------
@@ -67,7 +72,9 @@ def fit_table(
     if points < 4 or knots < 2:
         raise MeasurementError("too few points for a table", expected="4 points and 2 knots at least", got=f"{points}")
     count = min(knots, points // 2)
-    places = np.unique(np.append(np.quantile(everything, np.linspace(0.0, 1.0, count + 1)[1:-1]), valid_to))
+    first = everything[everything >= FIRST_KNOT * valid_to].min(initial=valid_to)
+    spread = np.quantile(everything, np.linspace(0.0, 1.0, count + 1)[1:-1])
+    places = np.unique(np.concatenate([[first], spread[spread > first], [valid_to]]))
     places = np.concatenate([[0.0], places[(places > 1e-6 * valid_to) & (places <= valid_to)]])
 
     def increments(x: Floats) -> Floats:
@@ -90,7 +97,6 @@ def fit_table(
     x_law, y_law = np.append(0.0, places[1:][rises]), np.append(0.0, values[1:][rises])
     if y_law[-1] <= y_law[-2]:
         x_law, y_law = np.delete(x_law, -2), np.delete(y_law, -2)
-    x_law, y_law = _without_rounding(x_law, y_law)
     law = TabulatedLaw(tuple(map(float, x_law)), tuple(map(float, y_law)))
     fitted = np.concatenate([design(x, lambda v: law.value(v)[:, None])[:, 0] for x in xs])
     measured = np.concatenate(list(responses))
@@ -104,18 +110,3 @@ def fit_table(
         rms=float(np.sqrt(np.mean(rest**2))),
         r_squared=1.0 - float(rest @ rest) / spread if spread > 0.0 else 0.0,
     )
-
-
-def _without_rounding(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Points whose monotone cubic rises to the last bit.
-
-    At either end its slope may be nought, and rounding then makes it negative by 1e-17, which a card
-    refuses; the point next to that end is left out instead.
-    """
-    while len(x) > 3:
-        fall = first_fall(TabulatedLaw(tuple(map(float, x)), tuple(map(float, y))), float(x[-1]))
-        if fall is None:
-            break
-        next_to_end = 1 if fall.start < 0.5 * x[-1] else -2
-        x, y = np.delete(x, next_to_end), np.delete(y, next_to_end)
-    return x, y

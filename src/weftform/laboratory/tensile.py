@@ -17,11 +17,14 @@ from weftform.laboratory.averaging import MeanCurve, average
 from weftform.laboratory.fitting import Band, PolynomialFit, Weighting, fit_polynomial
 from weftform.laboratory.monotone import power_basis
 from weftform.laboratory.presets import Quantity
+from weftform.laboratory.scatter import point_scatter
 from weftform.laboratory.specimen import Reading, Specimen, read_specimens
 from weftform.laboratory.stages import TensileStages, tensile_stages
 from weftform.laboratory.tabulating import TableFit, fit_table
 
 LawKind = Literal["polynomial", "tabulated"]
+LEAST_STRAIN = 1e-4
+"""Elongation over gauge length that a tensile test reaches at least; less was read in wrong units."""
 LARGEST_STRAIN = 0.5
 """A woven reinforcement pulled along its yarns breaks far below this nominal strain."""
 
@@ -160,10 +163,18 @@ def characterise_tensile(
                 got=f"{s.x[-1]:.6g} mm",
                 hint="are displacement and force swapped, or the units wrong? --column displacement=..., --unit ...",
             )
+        if s.x[-1] < LEAST_STRAIN * length:
+            raise MeasurementError(
+                f"{s.name}: the test ends at an elongation of {s.x[-1]:.4g} mm",
+                file=s.file,
+                line=int(s.lines[-1]),
+                expected=f"at least {LEAST_STRAIN * length:g} mm on {length:g} mm",
+                got=f"{s.x[-1]:.6g} mm",
+                hint="is the displacement in metres or in inches? --unit displacement=m",
+            )
     warnings = [w for s in specimens for w in s.warnings]
     mean = average(specimens)
-    noise = float(np.std(np.diff(mean.mean, 2)) / np.sqrt(6.0)) if len(mean.mean) > 4 else 0.0
-    stages = tensile_stages(mean.x, mean.mean, noise)
+    stages = tensile_stages(mean.x, mean.mean, point_scatter(mean.x, mean.mean))
     start, end = interval if interval is not None else (0.0, stages.linear_end)
     if not 0.0 <= start < end:
         raise MeasurementError("the interval is empty", expected="0 <= start < end", got=f"{start:g} to {end:g} mm")

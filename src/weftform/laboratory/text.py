@@ -16,6 +16,10 @@ LARGEST_FILE = 500_000_000
 
 DELIMITERS = (";", "\t", ",", "|")
 _NUMBER = re.compile(r"^[+-]?(\d+([.,]\d*)*|[.,]\d+)([eE][+-]?\d+)?$")
+_GROUPED = re.compile(r"^[+-]?\d{1,3}(?:[ \u00a0\u202f]\d{3})+(?:[.,]\d*)?$")
+"""Numbers as the French write them, with blanks between the thousands."""
+_ERROR_CELL = re.compile(r"^#(?:\S*[!?]|N/?A\b|#+)", re.IGNORECASE)
+"""What a spreadsheet puts where a formula has no value, such as #VALUE! or #N/A; no comment."""
 _MISSING = {"", "nan", "n/a", "na", "-", "--", "null", "none", "nul", "#n/a", "inf", "-inf", "+inf"}
 
 
@@ -113,7 +117,9 @@ def cut(file: Path) -> CutText:
     raw = read_bytes(file)
     text, encoding = decode(raw, file)
     lines = [
-        (n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")
+        (n, line)
+        for n, line in enumerate(text.splitlines(), 1)
+        if line.strip() and (not line.lstrip().startswith("#") or _ERROR_CELL.match(line.lstrip()))
     ]
     if not lines:
         raise MeasurementError("the file has comments only", file=file, expected="a header line and rows of numbers")
@@ -126,9 +132,10 @@ def _cells(line: str, delimiter: str) -> tuple[str, ...]:
     if delimiter == " ":
         return tuple(line.split())
     try:
-        return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)))
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
     except csv.Error:  # a cell of more than 128 kB: no table has one, so the line is left whole and found unreadable
         return (line.strip(),)
+    return tuple(re.sub(r"\s", "", c) if _GROUPED.match(c) else c for c in (cell.strip() for cell in cells))
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -173,12 +180,15 @@ def is_missing(cell: str) -> bool:
 
 
 def number(cell: str, decimal_comma: bool) -> float | None:
-    """Value of a cell, or None where it is missing; thousands marks are allowed.
+    """Value of a cell, or None where it is missing.
+
+    Marks between thousands are allowed where they are no decimal mark by mistake: in groups of three, several of them
+    or with a decimal mark behind. A single ``1.234`` among decimal commas could be either.
 
     Raises
     ------
     ValueError
-        The cell holds something that is not a number.
+        The cell holds something that is not a number, or one that could be read in two ways.
     """
     text = cell.strip()
     if is_missing(text):
@@ -186,7 +196,12 @@ def number(cell: str, decimal_comma: bool) -> float | None:
     if not _NUMBER.match(text):
         raise ValueError(cell)
     mark, thousands = (",", ".") if decimal_comma else (".", ",")
-    text = text.replace(thousands, "")
+    if thousands in text:
+        if not re.match(rf"^[+-]?[1-9]\d{{0,2}}(\{thousands}\d{{3}})+(\{mark}|$|[eE])", text):
+            raise ValueError(cell)
+        if text.count(thousands) == 1 and mark not in text:
+            raise ValueError(cell)
+        text = text.replace(thousands, "")
     if text.count(mark) > 1:
         raise ValueError(cell)
     value = float(text.replace(mark, "."))

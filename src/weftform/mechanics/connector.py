@@ -10,6 +10,7 @@ from typing import Any
 
 from weftform.mechanics.compiled import scalar
 from weftform.mechanics.piecewise import piecewise_integral, piecewise_slope, piecewise_value
+from weftform.mechanics.roots import inverse_root
 
 
 @scalar
@@ -58,3 +59,36 @@ def connector_energy(
     pull = piecewise_integral(coefficients, integrals, degree, pieces, width, end_slope, max(strain, 0.0))
     push = min(strain, 0.0)
     return pull + 0.5 * slack_slope * push * push
+
+
+@scalar
+def connector_pull(
+    dx: float,
+    dy: float,
+    dz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    inverse_length: float,
+    viscosity: float,
+    coefficients: Any,
+    degree: int,
+    pieces: int,
+    width: float,
+    end_slope: float,
+    slack_slope: float,
+) -> tuple[float, float]:
+    """Force of a connector with its dashpot, per length of the vector between its ends, and heat of the dashpot.
+
+    ``d`` is the vector between the ends [mm], ``u`` their relative velocity [mm/s]. The force is ``f d`` with the
+    first result ``f`` [N/mm]. The dashpot acts on the initial length: force ``c (d . u) d``, heat ``c (d . u)^2``
+    [N mm/s] with ``c`` = ``viscosity`` [N s/mm3] (docs/theory/dynamics.md).
+    """
+    squared = dx * dx + dy * dy + dz * dz
+    inverse = inverse_root(squared)
+    pull = connector_force(
+        coefficients, degree, pieces, width, end_slope, slack_slope, squared * inverse * inverse_length - 1.0
+    )
+    rate = dx * ux + dy * uy + dz * uz
+    drag = viscosity * rate
+    return pull * inverse + drag, drag * rate

@@ -12,12 +12,11 @@ w <= 0`` where ``u = +-(s - s0)`` and ``w = +-(z - z0)``.
 
 from __future__ import annotations
 
-import math
-
 from weftform.mechanics.compiled import scalar
+from weftform.mechanics.roots import inverse_root
 
-TINY = 1.0e-150
-"""Smallest length or force that divides; the square of anything above it is a normal number."""
+TINY = 1.0e-300
+"""Smallest square of a length or a traction that is not taken for zero."""
 
 
 @scalar
@@ -29,25 +28,27 @@ def rounded_edge(
     w = side_z * (z - z0)
     outside_u = max(u, 0.0)
     outside_w = max(w, 0.0)
-    reach = math.sqrt(outside_u * outside_u + outside_w * outside_w)
+    squared = outside_u * outside_u + outside_w * outside_w
+    deep = 1.0 if squared < TINY else 0.0
+    inverse = (1.0 - deep) * inverse_root(max(squared, TINY))
     depth = min(max(u, w), 0.0)
-    deep = 1.0 if reach < TINY else 0.0
-    inverse = (1.0 - deep) / max(reach, TINY)
-    flat = 1.0 if w >= u else 0.0
-    normal_u = outside_u * inverse + deep * (1.0 - flat)
-    normal_w = outside_w * inverse + deep * flat
-    return reach + depth - radius, side_s * normal_u, side_z * normal_w
+    flat = deep if w >= u else 0.0
+    normal_u = outside_u * inverse + (deep - flat)
+    normal_w = outside_w * inverse + flat
+    return squared * inverse + depth - radius, side_s * normal_u, side_z * normal_w
 
 
 @scalar
 def coulomb(trial_x: float, trial_y: float, trial_z: float, limit: float) -> tuple[float, float, float, float]:
-    """Return mapping of the trial friction force on the Coulomb disc of radius ``limit`` [N].
+    """Return mapping of the trial friction on the Coulomb disc of radius ``limit``, both forces or tractions.
 
-    Returns the three components and the product of the excess cut off and the force kept [N^2]: the excess
-    over the tangential stiffness is the slip of the step, made against the force that is kept, so the product
-    over that stiffness is the heat.
+    Returns the three components and the product of the excess cut off and what is kept: the excess over the
+    tangential stiffness is the slip of the step, made against the friction that is kept, so the product over that
+    stiffness is the heat.
     """
-    size = math.sqrt(trial_x * trial_x + trial_y * trial_y + trial_z * trial_z)
-    share = min(1.0, limit / max(size, TINY))
+    squared = trial_x * trial_x + trial_y * trial_y + trial_z * trial_z
+    inverse = inverse_root(max(squared, TINY))
+    share = min(1.0, limit * inverse)
+    size = squared * inverse
     kept = share * size
     return share * trial_x, share * trial_y, share * trial_z, (size - kept) * kept

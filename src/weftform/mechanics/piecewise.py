@@ -22,11 +22,22 @@ def horner(coefficients: Any, degree: int, start: int, x: float) -> float:
 
 @scalar
 def polynomial(coefficients: Any, x: float) -> float:
-    """Polynomial value, highest power first. The loop over a tuple unrolls: its type has a length."""
+    """Polynomial value of two terms or more, highest power first. The loop over a tuple unrolls: its type has a length.
+
+    Even and odd powers are summed side by side (Knuth, The Art of Computer Programming 2, Sec. 4.6.4: second-order
+    Horner), which halves the chain of operations that wait for each other.
+    """
+    terms = len(coefficients)
+    squared = x * x
     value: float = coefficients[0]
-    for k in range(1, len(coefficients)):
-        value = value * x + coefficients[k]
-    return value
+    other: float = coefficients[1]
+    for k in range(2, terms - 1, 2):
+        value = value * squared + coefficients[k]
+        other = other * squared + coefficients[k + 1]
+    if terms > 2 and terms % 2 == 1:
+        last: float = coefficients[terms - 1]
+        return value * squared + (other * x + last)
+    return value * x + other
 
 
 @scalar

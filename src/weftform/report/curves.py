@@ -61,8 +61,44 @@ def force_figure(result: Result, frame: int, force: str = "Force") -> Figure:
     _stroke_axis(axes, result)
     axes.set_ylim(min(0.0, 1.1 * float(newtons.min())), 1.12 * float(newtons.max()) or 1.0)
     axes.set_ylabel(f"{force}  [N]")
-    note = "Whole blank, friction included; mean over each output interval."
+    forming = result.study.model.kind == "forming"
+    note = (
+        "Whole blank, friction included; mean over each output interval."
+        if forming
+        else "Value at each output instant."
+    )
     headline(figure, f"{force} against {way_word(result)}", run_words(result, frame, note))
+    return figure
+
+
+def shear_law_figure(result: Result, frame: int) -> Figure:
+    """Normalised shear force found by a virtual shear test, beside the law of the card that it was run with.
+
+    Of a bias test by Eq. 5 from force and kinematic angle, of a picture frame from its force and angle.
+    """
+    found = result.summary["normalised_shear_force"]
+    angle = np.array(found["shear_angle_deg"])
+    frame_test = "from_frame_N_per_mm" in found
+    force = np.array(found["from_frame_N_per_mm" if frame_test else "from_eq_5_N_per_mm"])
+    figure = new_figure(6.2, 4.2)
+    axes = place(figure, 0.85, 0.98, 5.1, 2.7)
+    axes.grid(True)
+    smooth = np.linspace(angle.min(), angle.max(), 400)
+    law = result.fabric.normalised_shear_force(np.radians(smooth))
+    axes.plot(smooth, law, color=INK, lw=1.0, label="law of the card")
+    way = "force and angle of the frame" if frame_test else "Eq. 5 from force and kinematic angle"
+    axes.plot(angle, force, "o", ms=3.2, mfc="none", color=COLOURS["blue"], label=f"virtual test: {way}")
+    axes.set_ylim(1.12 * min(0.0, float(law.min())), 1.25 * float(law.max()) or 1.0)
+    axes.set_xlabel("shear angle  [deg]", color=INK)
+    axes.set_ylabel("normalised shear force  [N/mm]")
+    axes.legend(loc="upper left")
+    end = float(np.degrees(result.fabric.shear.valid_to))
+    if end < angle.max():
+        axes.axvline(end, color=FAINT, lw=0.8, ls=(0, (4, 2)))
+        axes.annotate(
+            "law ends, straight beyond ", (end, 0.02), xycoords=("data", "axes fraction"), ha="right", size=7.5
+        )
+    headline(figure, "Normalised shear force", run_words(result, frame))
     return figure
 
 

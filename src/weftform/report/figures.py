@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from weftform.report.curves import energies_figure, force_figure
+from weftform.report.curves import energies_figure, force_figure, shear_law_figure
 from weftform.report.edges import outline_figure
 from weftform.report.maps import above_map, deformed_map, flat_map, oblique_map
 from weftform.report.style import house_style, save
@@ -41,7 +41,17 @@ def generic_figures(result: Result, frame: int) -> Iterator[tuple[str, Figure]]:
     yield "energies", energies_figure(result, frame)
 
 
-_SETS: dict[str, FigureSet] = {"forming": forming_figures}
+def shear_test_figures(result: Result, frame: int) -> Iterator[tuple[str, Figure]]:
+    """Figures of a bias test or a picture frame: those of every test, and the shear law that comes back."""
+    yield from generic_figures(result, frame)
+    yield "shear-force", shear_law_figure(result, frame)
+
+
+_SETS: dict[str, FigureSet] = {
+    "forming": forming_figures,
+    "bias-extension": shear_test_figures,
+    "picture-frame": shear_test_figures,
+}
 
 
 def register_figures(kind: str, figures: FigureSet) -> None:

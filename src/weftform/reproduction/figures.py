@@ -13,13 +13,16 @@ from matplotlib.figure import Figure
 
 from weftform.laboratory.kinematics import bias_force, kinematic_angle
 from weftform.reproduction.laws import EQ_4_PRINTED, HEIGHT, WIDTH
+from weftform.reproduction.picture_frames import frame_tables, virtual_curve
 from weftform.result import Result
 
 Results = dict[str, Result]
 
 
 def draw_paper_figures(results: Results, folder: Path) -> list[Path]:
-    """Figs. 4, 6, 8, 9, 11, 13 and 14, and the formed hemispheres of Figs. 15 and 16; returns the files in that order."""
+    """Figs. 4, 6, 8, 9, 11, 13 and 14, the real picture frames, and the formed hemispheres of Figs. 15 and 16; returns the
+    files in that order.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in _figures(results):
@@ -55,6 +58,7 @@ def _figures(results: Results) -> Iterator[tuple[str, Figure]]:
     yield "fig-11-tensile-strip", _strip(results)
     yield "fig-13-bias-extension", _bias(results)
     yield "fig-14-thickness", _thickness(results)
+    yield "real-picture-frames", real_frames(results)
 
 
 def _tensile_law(results: Results) -> Figure:
@@ -173,4 +177,28 @@ def _thickness(results: Results) -> Figure:
             label=f"e = {results[run].fabric.thickness:g} mm",
         )
     axes.legend()
+    return figure
+
+
+def real_frames(results: Results) -> Figure:
+    """Measured tables of Cao et al. (2008) and the virtual frames run with their cards, one panel per laboratory."""
+    tables = frame_tables()
+    figure = Figure(figsize=(9.6, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(2, (len(tables) + 1) // 2, sharex=True, sharey=True).ravel()
+    for axes, table in zip(panels, tables, strict=False):
+        axes.plot(table.angle, table.force, "o", ms=3.5, mfc="none", color="0.45", label="measured")
+        axes.plot(*virtual_curve(results[f"frame-{table.laboratory}"]), color="#0057b8", lw=1.6, label="virtual test")
+        axes.set_title(table.laboratory, fontsize=10, loc="left")
+        axes.grid(alpha=0.25)
+    handles, labels = panels[0].get_legend_handles_labels()
+    for axes in panels[len(tables) :]:
+        axes.axis("off")
+        panels[len(panels) // 2 - 1].tick_params(labelbottom=True)  # the axis of the panel above
+        axes.legend(handles, labels, loc="center", frameon=False)
+    figure.supxlabel("Shear angle [deg]", fontsize=10)
+    figure.supylabel("Normalised shear force [N/mm]", fontsize=10)
+    figure.suptitle(
+        "Picture frames of Cao et al. (2008): the tables, and virtual frames with cards made from them", fontsize=10
+    )
     return figure

@@ -14,6 +14,7 @@ from weftform.fabric import Fabric
 from weftform.reproduction import simulated
 from weftform.reproduction.items import Item
 from weftform.reproduction.laws import law_items, misprints
+from weftform.reproduction.picture_frames import real_frame_items
 from weftform.reproduction.runs import run_all
 from weftform.result import Result
 from weftform.result.writer import write_whole
@@ -142,6 +143,7 @@ def reproduce(
         *simulated.tensile_items(results),
         *simulated.bias_items(results),
         *simulated.frame_items(results),
+        *real_frame_items(results),
         *simulated.hemisphere_items(results),
         *simulated.convergence_items(results),
         *misprints(fabric),

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+from weftform.reproduction.picture_frames import frame_runs, write_cards
 from weftform.result import Result
 
 SHORT = ("loading.displacement_mm=20", "loading.duration_s=0.4", "output.rows=81", "output.frames=3")
@@ -51,25 +52,28 @@ RUNS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Name of each run, its shipped study and what is changed in it; the longest first."""
 
 
-def _run_one(name: str, folder: str) -> str:
-    """Run one of :data:`RUNS`; a function of the module so that a process can be given it."""
+def _run_one(name: str, study: str, changes: tuple[str, ...], folder: str) -> str:
+    """Run one study; a function of the module so that a process can be given it."""
     from weftform.execution import run
     from weftform.study import Study
 
-    study, changes = RUNS[name]
     run(Study.load(study, changes), Path(folder) / name, threads=1)
     return name
 
 
 def run_all(folder: Path, watch: Callable[[str, int, int], None] | None = None) -> dict[str, Result]:
-    """Run everything into ``folder``; ``watch`` is called with the name, the number done and the number of runs."""
+    """Run everything into ``folder``; ``watch`` is called with the name, the number done and the number of runs.
+
+    The cards of the real picture frames are written there first, into ``cards``.
+    """
+    runs = RUNS | frame_runs(write_cards((folder / "cards").absolute()))
     workers = max(1, min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2, 8))
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
         # the first of each kind compiles its kernels; those that share a layout find them in the cache
-        jobs = [pool.submit(_run_one, name, str(folder)) for name in RUNS]
+        jobs = [pool.submit(_run_one, name, *what, str(folder)) for name, what in runs.items()]
         for done, job in enumerate(as_completed(jobs), 1):
             name = job.result()
             if watch is not None:
                 watch(name, done, len(jobs))
-    return {name: Result.open(folder / name) for name in RUNS}
+    return {name: Result.open(folder / name) for name in runs}

@@ -123,7 +123,8 @@ def element_items(results: Results) -> list[Item]:
     return items
 
 
-def _at(result: Result, displacement: float, column: str = "force_N") -> float:
+def value_at(result: Result, displacement: float, column: str = "force_N") -> float:
+    """Value of a column of the history at a displacement [mm]."""
     history = result.history
     return float(np.interp(displacement, history["displacement_mm"], history[column]))
 
@@ -141,7 +142,7 @@ def tensile_items(results: Results) -> list[Item]:
                     f"force at {u:g} mm with cells of {length:.3g} mm (N)",
                     "repaired Eq. 4",
                     float(law.force(u)),
-                    _at(results[run], u),
+                    value_at(results[run], u),
                     1e-2,
                 )
             )
@@ -151,7 +152,7 @@ def tensile_items(results: Results) -> list[Item]:
             "force at 3.9 mm along the weft (N)",
             "repaired Eq. 4",
             float(results["tensile-weft"].fabric.weft.force(3.9)),
-            _at(results["tensile-weft"], 3.9),
+            value_at(results["tensile-weft"], 3.9),
             1e-2,
         )
     )
@@ -172,7 +173,7 @@ def bias_items(results: Results) -> list[Item]:
                 f"force at {d:g} mm (N)",
                 "three uniform zones, inextensible",
                 float(bias_force(angle, coefficients, HEIGHT, WIDTH)[0]),
-                _at(bias, d),
+                value_at(bias, d),
                 0.05,
                 remark="equilibrium lies below: its zones are not uniform",
             )
@@ -185,7 +186,7 @@ def bias_items(results: Results) -> list[Item]:
                 f"force at {d:g} mm (N)",
                 "three uniform zones, inextensible",
                 float(bias_force(angle, coefficients, HEIGHT, WIDTH)[0]),
-                _at(bias, d),
+                value_at(bias, d),
                 remark="the steep end of Eq. 8 makes the field far from uniform; the fabric slips before",
             )
         )
@@ -197,7 +198,7 @@ def bias_items(results: Results) -> list[Item]:
                 f"mean shear angle of zone {zone} at 15 mm (deg)",
                 "Sec. 2.4.2, measured",
                 paper,
-                _at(bias, 15.0, column),
+                value_at(bias, 15.0, column),
                 remark="a measurement on a specimen that slips and is not quite clamped",
             )
         )
@@ -212,16 +213,23 @@ def bias_items(results: Results) -> list[Item]:
                 f"{what} at 15 mm (deg)",
                 f"Eq. 2 gives {np.degrees(kinematic_angle(15.0, HEIGHT, WIDTH)):.2f}",
                 None,
-                _at(bias, 15.0, column),
+                value_at(bias, 15.0, column),
             )
         )
     for zone in ("b", "c"):
-        upper, lower = (_at(bias, 15.0, f"shear_angle_zone_{zone}_{half}_deg") for half in ("upper", "lower"))
+        upper, lower = (value_at(bias, 15.0, f"shear_angle_zone_{zone}_{half}_deg") for half in ("upper", "lower"))
         items.append(Item(section, f"zone {zone.upper()}: upper half at 15 mm (deg)", "lower half", lower, upper, 0.01))
-    reference = _at(results["bias-middle"], 15.0)
+    reference = value_at(results["bias-middle"], 15.0)
     for run, what in (("bias-coarse", "cells 1.4 times larger"), ("bias-fine", "cells 1.4 times smaller")):
         items.append(
-            Item(section, f"force at 15 mm, {what} (N)", "cells of 2.72 mm", reference, _at(results[run], 15.0), 0.01)
+            Item(
+                section,
+                f"force at 15 mm, {what} (N)",
+                "cells of 2.72 mm",
+                reference,
+                value_at(results[run], 15.0),
+                0.01,
+            )
         )
     for d in (10.0, 15.0, 19.5):
         items.append(
@@ -229,8 +237,8 @@ def bias_items(results: Results) -> list[Item]:
                 section,
                 f"force at {d:g} mm at half the speed (N)",
                 "full speed",
-                _at(results["bias-middle"], d),
-                _at(results["bias-slow"], d),
+                value_at(results["bias-middle"], d),
+                value_at(results["bias-slow"], d),
                 0.02,
             )
         )
@@ -241,7 +249,7 @@ def bias_items(results: Results) -> list[Item]:
                 f"force at 15 mm with a thickness of {thickness} mm (N)",
                 "thickness 0.62 mm (Fig. 14)",
                 reference,
-                _at(results[f"bias-e{thickness}"], 15.0),
+                value_at(results[f"bias-e{thickness}"], 15.0),
                 0.01,
                 remark="moduli scaled with 1 / e",
             )
@@ -268,7 +276,7 @@ def bias_items(results: Results) -> list[Item]:
             "force at 20 mm with constant G12 e = 0.015 N/mm (N)",
             "Table 4; Fig. 13 gives no number",
             None,
-            _at(constant, 20.0),
+            value_at(constant, 20.0),
         )
     )
     return items

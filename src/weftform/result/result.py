@@ -16,6 +16,7 @@ from weftform.blank import Cell, YarnGrid
 from weftform.errors import ResultError
 from weftform.fabric import Fabric
 from weftform.result.fields import Fields
+from weftform.result.locate import bilinear, cell_corners, material_below
 from weftform.result.outline import formed_outline
 from weftform.study import Study
 
@@ -177,14 +178,26 @@ class Result:
         ResultError
             A point is outside the blank.
         """
-        return [_probe_one(self.fields(self.frame_at(stroke)), u, v) for u, v in points]
+        fields = self.fields(self.frame_at(stroke))
+        return [_probe_one(fields, u, v) for u, v in points]
+
+    def covers(self, u: float, v: float) -> bool:
+        """Whether (U along warp, V along weft) [mm] is a material point of the whole blank."""
+        folded, _ = self.grid.fold(np.array([u, v]))
+        return _inside(self.grid, *_places(self.grid, folded))
+
+    def material_below(self, x: float, y: float, stroke: float | None = None) -> tuple[float, float] | None:
+        """Material point (U, V) [mm] of the whole blank that lies at (x, y) [mm] in plan view; None where there is none.
+
+        The uppermost one where the part lies over itself.
+        """
+        return material_below(self.fields(self.frame_at(stroke)), x, y)
 
 
 def _probe_one(fields: Fields, u: float, v: float) -> Probe:
     grid = fields.grid
     folded, mirrored = grid.fold(np.array([u, v]))
-    i = folded[0] / grid.warp_pitch + grid.centre[0]
-    j = folded[1] / grid.weft_pitch + grid.centre[1]
+    i, j = _places(grid, folded)
     if not _inside(grid, i, j):
         raise ResultError(
             "that point is outside the blank",
@@ -219,6 +232,12 @@ def _probe_one(fields: Fields, u: float, v: float) -> Probe:
     )
 
 
+def _places(grid: YarnGrid, folded: Floats) -> tuple[float, float]:
+    """Grid coordinates of a material point of the modelled part."""
+    i, j = folded / (grid.warp_pitch, grid.weft_pitch) + grid.centre
+    return float(i), float(j)
+
+
 def _inside(grid: YarnGrid, i: float, j: float) -> bool:
     rows, columns = grid.cells.shape
     tolerance = 1e-6
@@ -251,19 +270,7 @@ def _bilinear_nodes(fields: Fields, i: float, j: float) -> Floats:
         a -= 1
     if grid.cells[b, a] == Cell.ABSENT and b > 0 and j - b < 1e-6:
         b -= 1
-    p, q = i - a, j - b
-    x00, x10, x11, x01 = (fields.positions[b + dj, a + di] for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)))
-    kind = Cell(grid.cells[b, a])
-    # the missing corner of a half cell completes the parallelogram, which makes the map linear
-    if kind == Cell.LACKS_00:
-        x00 = x10 + x01 - x11
-    elif kind == Cell.LACKS_10:
-        x10 = x00 + x11 - x01
-    elif kind == Cell.LACKS_11:
-        x11 = x10 + x01 - x00
-    elif kind == Cell.LACKS_01:
-        x01 = x00 + x11 - x10
-    return np.asarray((1 - p) * (1 - q) * x00 + p * (1 - q) * x10 + p * q * x11 + (1 - p) * q * x01)
+    return bilinear(cell_corners(fields, a, b), i - a, j - b)
 
 
 def _interpolate_cells(grid: YarnGrid, values: dict[str, Floats], u: float, v: float) -> dict[str, float]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,9 @@ from weftform.result.outline import formed_outline
 Floats = NDArray[np.float64]
 
 OURS = ("study.toml", "summary.json", "history.csv", "fields.vtkhdf", "outline.csv", "checkpoint.npz")
+
+MOST_PENDING = 2
+"""Frames that may wait to be written while the run goes on."""
 
 RESOLVED = "resolved by weftform"
 """How the study of a result folder begins; nobody's own study does."""
@@ -49,8 +54,10 @@ def claim_folder(folder: Path, *, resume: bool = False) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name in OURS:
             (folder / name).unlink(missing_ok=True)
-        for figure in (folder / "figures").glob("*.png"):
-            figure.unlink()
+        (folder / "comparison" / "comparison.json").unlink(missing_ok=True)
+        for drawn in ("figures", "comparison"):
+            for figure in (folder / drawn).glob("*.png"):
+                figure.unlink()
         probe = folder / ".writable"
         probe.touch()
         probe.unlink()
@@ -113,9 +120,32 @@ class ResultWriter:
         if not resume:
             (folder / "history.csv").write_text(",".join(columns) + "\n", encoding="utf-8")
         self._history = (folder / "history.csv").open("a", encoding="utf-8")
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="weftform-writer")
+        self._pending: deque[Future[None]] = deque()
 
     def frame(self, time: float, displacement: float, fields: Fields, contact_force: Floats) -> None:
-        """Add an instant to ``fields.vtkhdf``."""
+        """Add an instant to ``fields.vtkhdf``, beside the run that goes on; a former failure is raised here.
+
+        ``fields`` and ``contact_force`` are kept until they are written, so they must not change.
+        """
+        self._settle(MOST_PENDING - 1)
+        self._pending.append(self._worker.submit(self._write_frame, time, displacement, fields, contact_force))
+
+    def settle(self) -> None:
+        """Wait until every frame is on disk.
+
+        Raises
+        ------
+        OSError
+            One of them could not be written.
+        """
+        self._settle(0)
+
+    def _settle(self, most: int) -> None:
+        while self._pending and (len(self._pending) > most or self._pending[0].done()):
+            self._pending.popleft().result()
+
+    def _write_frame(self, time: float, displacement: float, fields: Fields, contact_force: Floats) -> None:
         points = fields.positions[self._active]
         node_shear = np.degrees(fields.node_shear[self._active])
         self._series.append(
@@ -150,6 +180,10 @@ class ResultWriter:
         write_whole(self.folder / "summary.json", json.dumps(values, indent=2) + "\n")
 
     def close(self) -> None:
-        """Close all files."""
-        self._series.close()
-        self._history.close()
+        """Write what is pending and close all files."""
+        try:
+            self.settle()
+        finally:
+            self._worker.shutdown(wait=True, cancel_futures=True)
+            self._series.close()
+            self._history.close()

@@ -2,7 +2,7 @@
 
 Energies of connectors, hourglass control and contact are functions of the state. The membrane's stress is a
 function of the state but, with constant thickness, has no potential, so its work is integrated with Simpson's
-rule from entry to entry. Friction and damping heat are sums of the time loop. The ledger therefore closes only if
+rule from entry to entry. (Friction and damping heat are sums of the time loop.) The ledger therefore closes only if
 the time loop integrates the same physics.
 """
 
@@ -24,15 +24,13 @@ CONNECTORS = 1
 MEMBRANE = 2
 HOURGLASS = 3
 CONTACT = 4
-FRICTION = 5
-DAMPED = 6
-ENTRIES = 7
+ENTRIES = 5
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def enter_ledger(
-    state, row_index, columns, stride, fields, half_cells, edge_weight, first_tool, tools, density,
-    membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses,
+    state, traits, trait_rows, row_index, columns, stride, fields, trait_fields, half_cells, tools, density,
+    membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses, grip,
 ):  # fmt: skip
     """Sum the energies and integrate the membrane's work since the last entry.
 
@@ -53,32 +51,30 @@ def enter_ledger(
     length = fields * stride
     for j in range(rows):
         base = row_index[j] * length
+        trait = trait_rows[row_index[j]] * trait_fields * stride
         above = row_index[j + 1] * length if j < rows - 1 else base
         for i in range(columns):
             n = base + i
-            area = state[n + at.AREA * stride]
+            m = trait + i
+            area = traits[m + at.AREA * stride]
             if area <= 0.0:
                 continue
             x = state[n]
             y = state[n + stride]
             z = state[n + 2 * stride]
             speed2 = state[n + 3 * stride] ** 2 + state[n + 4 * stride] ** 2 + state[n + 5 * stride] ** 2
-            out[KINETIC] += 0.5 * density * state[n + at.INERTIA * stride] * speed2
-            out[DAMPED] += state[n + at.DAMPED * stride]
+            out[KINETIC] += 0.5 * density * traits[m + at.INERTIA * stride] * speed2
             away = math.sqrt(x * x + y * y)
             for k in range(tools):
                 t = tool_table[k]
                 distance, _, _ = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
                 gap = distance - t[5]
-                field = n + (first_tool + at.TOOL_FIELDS * k) * stride
                 stiffness = t[6] * area
-                out[FRICTION] += state[field + 3 * stride] / (t[8] * stiffness)
                 if gap < 0.0:
-                    stick = (state[field] ** 2 + state[field + stride] ** 2 + state[field + 2 * stride] ** 2) / (
-                        t[8] * stiffness
-                    )
-                    out[CONTACT] += 0.5 * stiffness * gap * gap + 0.5 * stick
-            weight = state[n + at.WARP_LINE * stride]
+                    held = grip[row_index[j], k, :, i]
+                    stick = held[0] ** 2 + held[1] ** 2 + held[2] ** 2
+                    out[CONTACT] += 0.5 * stiffness * gap * gap + 0.5 * area * stick / (t[8] * t[6])
+            weight = traits[m + at.WARP_LINE * stride]
             if weight > 0.0:
                 dx = state[n + 1] - x
                 dy = state[n + 1 + stride] - y
@@ -90,7 +86,7 @@ def enter_ledger(
                     * connector_energy(warp_law[0], warp_law[1], wd, wp, warp_law[2], warp_law[3], warp_law[4], strain)
                 )
             u = above + i
-            weight = state[n + at.WEFT_LINE * stride]
+            weight = traits[m + at.WEFT_LINE * stride]
             if weight > 0.0:
                 dx = state[u] - x
                 dy = state[u + stride] - y
@@ -105,15 +101,16 @@ def enter_ledger(
             continue
         for i in range(columns - 1):
             n = base + i
-            volume = state[n + at.VOLUME * stride]
+            m = trait + i
+            volume = traits[m + at.VOLUME * stride]
             if volume <= 0.0:
                 continue
             u = above + i
             low = 0.5
             left = 0.5
             if half_cells:
-                low = state[n + edge_weight * stride]
-                left = state[n + (edge_weight + 1) * stride]
+                low = traits[m + at.LOWER_WEIGHT * stride]
+                left = traits[m + at.LEFT_WEIGHT * stride]
             whole = 16.0 * low * (1.0 - low) * left * (1.0 - left)
             g11 = 0.0
             g22 = 0.0
@@ -121,7 +118,7 @@ def enter_ledger(
             hourglass = 0.0
             q = 0.0
             if half_cells:
-                q = state[n + (edge_weight + 2) * stride]
+                q = traits[m + at.MIRROR * stride]
             for c in range(3):
                 p = c * stride
                 lower = state[n + 1 + p] - state[n + p]
@@ -132,13 +129,13 @@ def enter_ledger(
                 g2 = (left * start + (1.0 - left) * end) / weft_pitch
                 if q > 0.0:
                     # completed by its mirror image (blank.grid.mirrors)
-                    sign = state[n + (edge_weight + 3) * stride] / q if c == 2 else membrane[5 + c]
+                    sign = traits[m + at.MIRROR_Z * stride] / q if c == 2 else membrane[6 + c]
                     g1, g2 = (1.0 - q) * g1 + q * sign * g2, (1.0 - q) * g2 + q * sign * g1
                 g11 += g1 * g1
                 g22 += g2 * g2
                 g12 += g1 * g2
                 hourglass += (upper - lower) ** 2
-            out[HOURGLASS] += 0.5 * membrane[4] * volume * whole * hourglass
+            out[HOURGLASS] += 0.5 * membrane[5] * volume * whole * hourglass
             t = half_tangent(g11, g22, g12)
             tau = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], t)
             e1 = log_stretch(g11, series)
@@ -161,8 +158,8 @@ def enter_ledger(
                 volume
                 / 6.0
                 * (
-                    membrane[2] * (new * e1 + mid * m1 + old * o1) * (e1 - o1)
-                    + membrane[3] * (new * e2 + mid * m2 + old * o2) * (e2 - o2)
+                    membrane[3] * (new * e1 + mid * m1 + old * o1) * (e1 - o1)
+                    + membrane[4] * (new * e2 + mid * m2 + old * o2) * (e2 - o2)
                     + (new * tau + mid * mt + old * ot) * (angle - oa)
                 )
             )

@@ -12,21 +12,26 @@ from dataclasses import dataclass
 
 POSITION = 0
 VELOCITY = 3
-INVERSE_MASS = 6
-AREA = 9
-WARP_LINE = 10
-WEFT_LINE = 11
-VOLUME = 12
-INERTIA = 13
-"""Area whose mass the crossing carries [mm2]: AREA, or more where an edge yarn would be light for its stiffness."""
-DAMPED = 14
-"""Work of the damping at the crossing, accumulated [mJ]."""
-LEDGER = 15
+LEDGER = 6
 """Per cell: ln l1, ln l2, shear angle at the last ledger entry, and the membrane work accumulated so far."""
-FIRST_OPTIONAL = 19
+FIRST_OPTIONAL = 10
 
-TOOL_FIELDS = 4
-"""Per tool: friction force (3) and friction heat times tangential stiffness, accumulated [N^2]."""
+# Traits: what never changes. Rows that are alike share one row of traits, so that the sweep hardly has to fetch them.
+INVERSE_MASS = 0
+AREA = 3
+WARP_LINE = 4
+WEFT_LINE = 5
+VOLUME = 6
+INERTIA = 7
+"""Area whose mass the crossing carries [mm2]: AREA, or more where an edge yarn would be light for its stiffness."""
+LOWER_WEIGHT = 8
+"""With half cells: weights of the lower and of the left edge, share of the mirror image, and that times its sign z."""
+LEFT_WEIGHT = 9
+MIRROR = 10
+MIRROR_Z = 11
+
+LANES = 8
+"""Loops run over whole blocks of so many places: the widest vector unit holds eight numbers."""
 
 LEAD = 16
 """Unused numbers before each scratch row, so that index i - 1 exists and rows stay aligned."""
@@ -35,9 +40,14 @@ WIDTHS = (16, 32, 48, 80, 112, 144, 208, 272, 400, 528, 784, 1040, 1296, 1552, 2
 """Row strides that are compiled; no power of two, so that fields do not compete for the same cache sets."""
 
 
+def blocks_for(columns: int) -> int:
+    """Blocks of :data:`LANES` places that hold a row."""
+    return -(-columns // LANES)
+
+
 def stride_for(columns: int) -> int:
     """Smallest compiled stride that holds a row and the padding that vector loops run into."""
-    needed = columns + 8
+    needed = blocks_for(columns) * LANES + LANES
     for width in WIDTHS:
         if width >= needed:
             return width
@@ -74,24 +84,19 @@ class Layout:
     shear_pieces: int
 
     @property
-    def edge_weight(self) -> int:
-        """First of the fields of half cells: weights of the lower and left edge, share of the mirror image, that times sign z."""
-        return FIRST_OPTIONAL
+    def traits(self) -> int:
+        """Fields of a row of traits."""
+        return MIRROR_Z + 1 if self.half_cells else INERTIA + 1
 
     @property
     def force(self) -> int:
-        """First of the three fields with the internal force, kept where crossings are driven."""
-        return FIRST_OPTIONAL + 4 * self.half_cells
-
-    @property
-    def tool(self) -> int:
-        """First field of the first tool."""
-        return self.force + 3 * self.driven
+        """First of the three fields with the force on a crossing, kept where crossings are driven."""
+        return FIRST_OPTIONAL
 
     @property
     def fields(self) -> int:
         """Fields per row."""
-        return self.tool + TOOL_FIELDS * self.tools
+        return self.force + 3 * self.driven
 
     @property
     def row(self) -> int:
@@ -102,3 +107,13 @@ class Layout:
     def block(self) -> int:
         """Numbers of a scratch block of three components."""
         return 3 * self.stride + 2 * LEAD
+
+    @property
+    def edge_scratch(self) -> int:
+        """Numbers of scratch for edges: warp, carried to the row above, right share of the weft edges."""
+        return 3 * self.block
+
+    @property
+    def node_scratch(self) -> int:
+        """Numbers of scratch for crossings: weft edges, force, and four rows of heats and axial forces."""
+        return 3 * self.block + self.stride

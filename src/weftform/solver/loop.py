@@ -1,9 +1,9 @@
 """The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
 
-Order within a sweep, for each row: warp connectors, cells above, weft connectors above, sum on the crossings,
-contact, update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows; a
-band holds copies of its neighbours' edge rows (halos), refreshed before each step, so no thread reads what
-another writes, and every row is computed by the same operations in the same order whatever the number of bands.
+Order within a sweep, for each row: contact, then its warp connectors with the cells and weft connectors above, then
+the update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its
+neighbours' edge rows (halos), refreshed before each step, so no thread reads what another writes, and every row is
+computed by the same operations in the same order whatever the number of bands.
 """
 
 from __future__ import annotations
@@ -18,19 +18,11 @@ import numpy as np
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.motion import motion_value
 from weftform.solver import layout as at
+from weftform.solver.contact_rows import contact_row, face_row
 from weftform.solver.layout import Layout
-from weftform.solver.rows import (
-    cell_row,
-    contact_row,
-    face_row,
-    gather_row,
-    keep_row,
-    update_row,
-    warp_row,
-    weft_row,
-)
+from weftform.solver.rows import carry_row, fabric_row, update_row, warp_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
-from weftform.solver.survey import ON_FACE, TOUCHING
+from weftform.solver.survey import ON_FACE
 
 # columns of the table of rigid tools
 T_SHAPE = 0
@@ -79,70 +71,76 @@ def _mode_amplitude(kind, value):
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
 def _sweep_band(
-    state, band, bands, first, last, spans, edge, node, membrane, series,
+    state, traits, trait_rows, band, bands, first, last, spans, edge, node, membrane, series,
     warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-    tool_table, poses, touching, reactions, step, last_step, kick, keep, damping, viscosity,
-    stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
+    tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep, damping, viscosity,
+    stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
 ):  # fmt: skip
     """One step of the rows ``first`` to ``last`` (halos included) of a band.
 
     ``spans`` holds for each row where its crossings begin and how many there are, the same for its warp edges
     (wider by what its neighbours have), and for the cells above it (:func:`weftform.solver.spans.row_spans`).
+    ``pieces`` holds for each tool and row how many pieces of it can touch, then where each begins, its length and
+    kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of
+    damping and of friction with each tool.
     """
     flush_subnormals()
     for k in range(block):
         edge[block + k] = 0.0
-        node[k] = 0.0
+        node[block + k] = 0.0
     own_first = first + (1 if band > 0 else 0)
     own_last = last - (1 if band < bands - 1 else 0)
     for r in range(first, own_last + 1):
         row = np.uint64(r) * np.uint64(row_length)
+        trait = np.uint64(trait_rows[r]) * np.uint64(trait_length)
         if r >= own_first:
-            begin = spans[r, 2]
-            warp_row(
-                state, row + np.uint64(begin), np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride,
-                warp_inverse, viscosity, warp_degree, warp_pieces, warp_law, ends[0],
-            )  # fmt: skip
+            for k in range(tools):
+                reaction = 0.0
+                heat = 0.0
+                for m in range(pieces[k, r, 0, 0]):
+                    begin = pieces[k, r, m + 1, 0]
+                    place = row + np.uint64(begin)
+                    held = np.uint64((r * tools + k) * (3 * stride) + begin)
+                    count = np.uint64(pieces[k, r, m + 1, 1])
+                    if pieces[k, r, m + 1, 2] == ON_FACE:
+                        axial, slipped = face_row(
+                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
+                            tool_table[k], poses[k, P_Z], last_step,
+                        )  # fmt: skip
+                    else:
+                        axial, slipped = contact_row(
+                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
+                            tool_table[k], poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
+                        )  # fmt: skip
+                    reaction += axial
+                    heat += slipped
+                reactions[k, r] = reaction
+                heats[r, 1 + k] += heat
         if r < last:
             begin = spans[r, 4]
-            count = np.uint64(spans[r, 5])
-            cell_row(
-                state, row + np.uint64(begin), count, edge[begin:], stride, row_length, half_cells, edge_weight,
-                membrane, shear_degree, shear_pieces, shear_law, ends[2], series,
-            )  # fmt: skip
-            weft_row(
-                state, row + np.uint64(begin), count, edge[begin:], node[begin:], stride, row_length, half_cells,
-                weft_inverse, viscosity, weft_degree, weft_pieces, weft_law, ends[1],
+            fabric_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 5]),
+                edge[begin:], node[begin:], stride, row_length, half_cells, membrane, series,
+                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law,
+                weft_inverse, viscosity * weft_inverse * weft_inverse, weft_degree, weft_pieces, weft_law,
+                shear_degree, shear_pieces, shear_law, ends,
             )  # fmt: skip
         else:
-            for k in range(block):
-                node[k] = 0.0
-            for k in range(stride):
-                node[2 * block + at.LEAD + 2 * stride + k] = 0.0
-        if r < own_first:
-            continue
-        begin = spans[r, 0]
-        count = np.uint64(spans[r, 1])
-        place = row + np.uint64(begin)
-        edges = edge[begin:]
-        nodes = node[begin:]
-        gather_row(count, edges, nodes, stride)
-        if driven:
-            keep_row(state, place, count, nodes, stride, force_field)
-        for k in range(tools):
-            if touching[k, r] == ON_FACE:
-                reactions[k, r] = face_row(
-                    state, place, count, nodes, stride, first_tool + 4 * k, tool_table[k], poses[k, P_Z], last_step
-                )
-            elif touching[k, r] == TOUCHING:
-                reactions[k, r] = contact_row(
-                    state, place, count, nodes, stride, first_tool + 4 * k, tool_table[k],
-                    poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
-                )  # fmt: skip
-            else:
-                reactions[k, r] = 0.0
-        update_row(state, place, count, nodes, stride, step, kick, keep, damping)
+            begin = spans[r, 2]
+            warp_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
+                edge[begin:], node[begin:], stride,
+                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
+            )  # fmt: skip
+        begin = spans[r, 2]
+        if r >= own_first:
+            heats[r, 0] += update_row(
+                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
+                edge[begin:], node[begin:], stride, step, kick, keep, damping, driven, force_field,
+            )  # fmt: skip
+        else:
+            carry_row(np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride)
 
 
 @cache
@@ -156,22 +154,23 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     tools = layout.tools
     half_cells = layout.half_cells
     driven = layout.driven
-    edge_weight, force_field, first_tool = layout.edge_weight, layout.force, layout.tool
+    trait_length = layout.traits * layout.stride
+    force_field = layout.force
     warp_degree, warp_pieces = layout.warp_degree, layout.warp_pieces
     weft_degree, weft_pieces = layout.weft_degree, layout.weft_pieces
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
 
     def advance(
-        state, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
+        state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
         warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-        tool_table, poses, touching, reactions, motion_times, motion_values, motion_knots, ramp,
+        tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
         density, viscous,
     ):  # fmt: skip
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
         environment = flush_subnormals()
         bands = bounds.shape[0]
-        rows = touching.shape[1]
+        rows = pieces.shape[1]
         done = 0
         amplitude = np.zeros(mode_motion.shape[0])
         step = clock[C_STEP]
@@ -204,11 +203,12 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                     state[target_row + k] = state[source + k]
             for band in numba.prange(bands):
                 _sweep_band(
-                    state, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band], node[band], membrane,
-                    series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse, tool_table, poses, touching,
-                    reactions, step, last_step, kick, keep, 0.25 * alpha * density * inertia * mean_step,
+                    state, traits, trait_rows, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band],
+                    node[band], membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
+                    tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep,
+                    0.25 * alpha * density * inertia * mean_step,
                     viscous * density * inertia / step,
-                    stride, row_length, block, tools, half_cells, driven, edge_weight, force_field, first_tool,
+                    stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip
             for k in range(tools):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from weftform.solver.layout import LANES
+
 
 def row_spans(active: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Begin and length of the loops of each row.
@@ -17,6 +19,7 @@ def row_spans(active: NDArray[np.bool_]) -> NDArray[np.int64]:
     Returns
     -------
     shape [rows, 6]: begin and length for crossings, for warp edges, and for the cells and weft edges above the row.
+    Both are multiples of ``layout.LANES``; a span may end in the padding of the row.
 
     Notes
     -----
@@ -41,8 +44,8 @@ def row_spans(active: NDArray[np.bool_]) -> NDArray[np.int64]:
     wide_first = np.maximum(wide_first - 1, 0)
     above_first = np.minimum(wide_first, np.append(wide_first[1:], columns))
     above_last = np.maximum(wide_last, np.append(wide_last[1:], -1))
-    spans = [
-        (np.minimum(low, columns - 1), np.maximum(high - low + 1, 0))
-        for low, high in ((first, last), (wide_first, wide_last), (above_first, above_last))
-    ]
+    spans = []
+    for low, high in ((first, last), (wide_first, wide_last), (above_first, above_last)):
+        begin = np.minimum(low, columns - 1) // LANES * LANES
+        spans.append((begin, np.where(high >= low, -(-(high + 1 - begin) // LANES) * LANES, 0)))
     return np.column_stack([column for pair in spans for column in pair]).astype(np.int64)

@@ -12,6 +12,8 @@ from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent
 from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
 from weftform.solver import layout as at
+from weftform.solver.rows import U1
+from weftform.solver.vector_loops import row_loop, use_full_width
 
 # what a survey returns
 WARP_STRAIN = 0
@@ -29,10 +31,12 @@ WORST_ROW = 6
 WORST_COLUMN = 7
 SLACKEST = 8
 """Smallest nominal strain of a connector (negative: shortened)."""
-ENTRIES = 9
+KINETIC = 9
+"""Sum over the crossings of inertia area times squared speed [mm4/s2]."""
+ENTRIES = 10
 
 CLEAR, TOUCHING, ON_FACE = 0, 1, 2
-"""How a row stands to a tool until the next survey: out of reach, within reach, within reach of its flat face only."""
+"""How a crossing stands to a tool until the next survey: out of reach, within reach, within reach of its flat face."""
 
 LARGEST_SPEED = 1.0e8
 """mm/s; a crossing faster than that (100 km/s) belongs to a run that has blown up."""
@@ -40,10 +44,85 @@ LARGEST_STRAIN = 10.0
 """A connector eleven times its length belongs to a run that has blown up."""
 
 
+@row_loop
+def speed_row(state, row, traits, trait, count, stride, fastest, broken, kinetic):
+    """Largest squared speed so far in each column, a zero that turns NaN where a number is not finite, and kinetic energy."""
+    use_full_width()
+    s = np.uint64(stride)
+    x, y, z = row, row + s, row + s + s
+    vx, vy, vz = z + s, z + s + s, z + s + s + s
+    inertia = trait + s * np.uint64(at.INERTIA)
+    for i in range(count):
+        u, v, w = state[vx + i], state[vy + i], state[vz + i]
+        speed = u * u + v * v + w * w
+        fastest[i] = max(fastest[i], speed)
+        kinetic[i] += traits[inertia + i] * speed
+        broken[i] += 0.0 * (state[x + i] + state[y + i] + state[z + i] + speed)
+
+
+@row_loop
+def connector_row(state, row, other, traits, weight, count, stride, inverse, longest, shortest):
+    """Largest and smallest squared stretch so far in each column, of the connectors from ``row`` to ``other``."""
+    use_full_width()
+    s = np.uint64(stride)
+    for i in range(count):
+        dx = state[other + i] - state[row + i]
+        dy = state[other + s + i] - state[row + s + i]
+        dz = state[other + s + s + i] - state[row + s + s + i]
+        squared = (dx * dx + dy * dy + dz * dz) * (inverse * inverse)
+        there = traits[weight + i] > 0.0
+        longest[i] = max(longest[i], squared if there else 0.0)
+        shortest[i] = min(shortest[i], squared if there else math.inf)
+
+
+@row_loop
+def shear_row(
+    state, row, above, traits, trait, count, stride, weights, lower, left, warp_inverse, weft_inverse, sheared
+):
+    """Largest ``|tan(gamma / 2)|`` so far in each column, of the cells between a row and the next."""
+    use_full_width()
+    s = np.uint64(stride)
+    volume = trait + s * np.uint64(at.VOLUME)
+    for i in range(count):
+        wl = weights[lower + i]
+        wa = weights[left + i]
+        g11 = 0.0
+        g22 = 0.0
+        g12 = 0.0
+        for c in range(3):
+            p = row + i + s * np.uint64(c)
+            q = above + i + s * np.uint64(c)
+            g1 = wl * (state[p + U1] - state[p]) + (1.0 - wl) * (state[q + U1] - state[q])
+            g2 = wa * (state[q] - state[p]) + (1.0 - wa) * (state[q + U1] - state[p + U1])
+            g11 += g1 * g1
+            g22 += g2 * g2
+            g12 += g1 * g2
+        t = half_tangent(
+            g11 * warp_inverse * warp_inverse, g22 * weft_inverse * weft_inverse, g12 * warp_inverse * weft_inverse
+        )
+        sheared[i] = max(sheared[i], abs(t) if traits[volume + i] > 0.0 else 0.0)
+
+
+@row_loop
+def gap_row(state, row, traits, trait, count, stride, tool, tool_z, gap, inward):
+    """Gap between the surface of the fabric and a tool, and the way from its rounded edge inwards on its face."""
+    use_full_width()
+    s = np.uint64(stride)
+    area = trait + s * np.uint64(at.AREA)
+    side_s, s0, side_z, z0, radius, half_thickness = tool[0], tool[1], tool[2], tool[3], tool[4], tool[5]
+    for i in range(count):
+        x, y = state[row + i], state[row + s + i]
+        away = math.sqrt(x * x + y * y)
+        distance, _, _ = rounded_edge(away, state[row + s + s + i] - tool_z, side_s, s0, side_z, z0, radius)
+        there = traits[area + i] > 0.0
+        gap[i] = distance - half_thickness if there else math.inf
+        inward[i] = side_s * (s0 - away) if there else math.inf
+
+
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def survey(
-    state, row_index, columns, stride, fields, half_cells, edge_weight, tools, warp_pitch, weft_pitch,
-    tool_table, poses, touching, reach, ahead, margin,
+    state, traits, trait_rows, row_index, spans, stride, fields, trait_fields, half_cells, tools, warp_inverse, weft_inverse,
+    tool_table, poses, pieces, reach, ahead, margin,
 ):  # fmt: skip
     """Survey the state.
 
@@ -51,123 +130,152 @@ def survey(
     ----------
     row_index
         Local row of each row of the grid, shape [rows].
-    touching
-        Output, shape [tools, local rows]: :data:`CLEAR`, :data:`TOUCHING` or :data:`ON_FACE`.
+    spans
+        Of each local row (:func:`weftform.solver.spans.row_spans`).
+    pieces
+        Output, shape [tools, local rows, 1 + most pieces, 3]: in the first entry how many pieces of the row a tool can
+        touch until the next survey; then where each begins, its length, and :data:`TOUCHING` or :data:`ON_FACE`.
     reach
         Time until the next survey [s]; with twice the largest speed it bounds how far a crossing can come.
     ahead
         Steps until the next survey.
     margin
-        Gap below which a row counts as touching in any case [mm].
+        Gap below which a crossing counts as touching in any case [mm].
 
     Returns
     -------
     Array of shape [ENTRIES], see the constants of this module.
     """
     out = np.zeros(ENTRIES)
-    out[FINITE] = 1.0
     rows = row_index.shape[0]
     length = fields * stride
-    gaps = np.full((tools, rows), np.inf)
-    from_edge = np.full((tools, rows), np.inf)
-    fastest = 0.0
-    longest_warp = 0.0
-    longest_weft = 0.0
-    shortest = math.inf
-    sheared = 0.0
+    fastest = np.zeros(stride)
+    broken = np.zeros(stride)
+    kinetic = np.zeros(stride)
+    longest_warp = np.zeros(stride)
+    longest_weft = np.zeros(stride)
+    shortest = np.full(stride, np.inf)
+    sheared = np.zeros(stride)
+    halves = np.full(stride, 0.5)
+    weights = traits if half_cells else halves
     for j in range(rows):
-        base = row_index[j] * length
-        above = row_index[j + 1] * length if j < rows - 1 else base
-        for i in range(columns):
-            n = base + i
-            if state[n + at.AREA * stride] <= 0.0:
-                continue
-            x = state[n]
-            y = state[n + stride]
-            z = state[n + 2 * stride]
-            vx = state[n + 3 * stride]
-            vy = state[n + 4 * stride]
-            vz = state[n + 5 * stride]
-            speed = vx * vx + vy * vy + vz * vz
-            if not (speed < LARGEST_SPEED**2 and math.isfinite(x + y + z)):
-                out[FINITE] = 0.0
-                out[WORST_ROW] = j
-                out[WORST_COLUMN] = i
-                return out
-            fastest = max(fastest, speed)
-            away = math.sqrt(x * x + y * y)
-            for k in range(tools):
-                distance, _, _ = rounded_edge(
-                    away,
-                    z - poses[k, 0],
-                    tool_table[k, 0],
-                    tool_table[k, 1],
-                    tool_table[k, 2],
-                    tool_table[k, 3],
-                    tool_table[k, 4],
-                )
-                gaps[k, j] = min(gaps[k, j], distance - tool_table[k, 5])
-                from_edge[k, j] = min(from_edge[k, j], tool_table[k, 0] * (tool_table[k, 1] - away))
-            if state[n + at.WARP_LINE * stride] > 0.0:
-                dx = state[n + 1] - x
-                dy = state[n + 1 + stride] - y
-                dz = state[n + 1 + 2 * stride] - z
-                squared = (dx * dx + dy * dy + dz * dz) / (warp_pitch * warp_pitch)
-                longest_warp = max(longest_warp, squared)
-                shortest = min(shortest, squared)
-                if squared > (1.0 + LARGEST_STRAIN) ** 2:
-                    out[FINITE] = 0.0
-                    out[WORST_ROW] = j
-                    out[WORST_COLUMN] = i
-            u = above + i
-            if state[n + at.WEFT_LINE * stride] > 0.0:
-                dx = state[u] - x
-                dy = state[u + stride] - y
-                dz = state[u + 2 * stride] - z
-                squared = (dx * dx + dy * dy + dz * dz) / (weft_pitch * weft_pitch)
-                longest_weft = max(longest_weft, squared)
-                shortest = min(shortest, squared)
-                if squared > (1.0 + LARGEST_STRAIN) ** 2:
-                    out[FINITE] = 0.0
-                    out[WORST_ROW] = j
-                    out[WORST_COLUMN] = i
+        r = row_index[j]
+        begin = spans[r, 0]
+        count = np.uint64(spans[r, 1])
+        row = np.uint64(r * length + begin)
+        above = np.uint64(row_index[min(j + 1, rows - 1)] * length + begin)
+        trait = np.uint64(trait_rows[r] * trait_fields * stride + begin)
+        speed_row(
+            state, row, traits, trait, count, stride, fastest[begin:], broken[begin:], kinetic[begin:]
+        )  # fmt: skip
+        weight = trait + np.uint64(at.WARP_LINE * stride)
+        connector_row(
+            state, row, row + U1, traits, weight, count, stride, warp_inverse, longest_warp[begin:], shortest[begin:]
+        )  # fmt: skip
         if j == rows - 1:
             continue
-        for i in range(columns - 1):
-            n = base + i
-            if state[n + at.VOLUME * stride] <= 0.0:
-                continue
-            u = above + i
-            low = 0.5
-            left = 0.5
-            if half_cells:
-                low = state[n + edge_weight * stride]
-                left = state[n + (edge_weight + 1) * stride]
-            g11 = 0.0
-            g22 = 0.0
-            g12 = 0.0
-            for c in range(3):
-                p = c * stride
-                g1 = low * (state[n + 1 + p] - state[n + p]) + (1.0 - low) * (state[u + 1 + p] - state[u + p])
-                g2 = left * (state[u + p] - state[n + p]) + (1.0 - left) * (state[u + 1 + p] - state[n + 1 + p])
-                g11 += g1 * g1
-                g22 += g2 * g2
-                g12 += g1 * g2
-            scale = warp_pitch * weft_pitch
-            t = half_tangent(g11 / warp_pitch**2, g22 / weft_pitch**2, g12 / scale)
-            sheared = max(sheared, abs(t))
-    out[FASTEST] = math.sqrt(fastest)
-    out[WARP_STRAIN] = math.sqrt(longest_warp) - 1.0
-    out[WEFT_STRAIN] = math.sqrt(longest_weft) - 1.0
-    out[SLACKEST] = math.sqrt(shortest) - 1.0 if shortest < math.inf else 0.0
-    out[HALF_TANGENT] = sheared
+        weight = trait + np.uint64(at.WEFT_LINE * stride)
+        connector_row(
+            state, row, above, traits, weight, count, stride, weft_inverse, longest_weft[begin:], shortest[begin:]
+        )  # fmt: skip
+        lower = trait + np.uint64(at.LOWER_WEIGHT * stride) if half_cells else np.uint64(0)
+        left = trait + np.uint64(at.LEFT_WEIGHT * stride) if half_cells else np.uint64(0)
+        shear_row(
+            state, row, above, traits, trait, count, stride, weights, lower, left, warp_inverse, weft_inverse,
+            sheared[begin:],
+        )  # fmt: skip
+    longest = max(longest_warp.max(), longest_weft.max())
+    out[FASTEST] = math.sqrt(fastest.max())
+    out[WARP_STRAIN] = math.sqrt(longest_warp.max()) - 1.0
+    out[WEFT_STRAIN] = math.sqrt(longest_weft.max()) - 1.0
+    out[SLACKEST] = math.sqrt(shortest.min()) - 1.0 if shortest.min() < math.inf else 0.0
+    out[HALF_TANGENT] = sheared.max()
+    out[KINETIC] = kinetic.sum()
+    out[FINITE] = 1.0
+    if not (
+        broken.sum() == 0.0 and out[FASTEST] < LARGEST_SPEED and longest < (1.0 + LARGEST_STRAIN) ** 2
+    ):  # also where a NaN is
+        out[FINITE] = 0.0
+        out[WORST_ROW], out[WORST_COLUMN] = worst_crossing(
+            state, traits, trait_rows, row_index, spans, stride, fields, trait_fields, warp_inverse, weft_inverse
+        )
+        return out
+    gap = np.empty(stride)
+    inward = np.empty(stride)
     for k in range(tools):
         way = 2.0 * (out[FASTEST] * reach + abs(poses[k, 0] - poses[k, 3]) * ahead) + margin
         for j in range(rows):
-            near = ON_FACE if from_edge[k, j] > way else TOUCHING
-            touching[k, row_index[j]] = near if gaps[k, j] < way else CLEAR
-            out[PENETRATION] = max(out[PENETRATION], -gaps[k, j])
+            r = row_index[j]
+            begin = spans[r, 0]
+            count = spans[r, 1]
+            trait = np.uint64(trait_rows[r] * trait_fields * stride + begin)
+            gap_row(
+                state,
+                np.uint64(r * length + begin),
+                traits,
+                trait,
+                np.uint64(count),
+                stride,
+                tool_table[k],
+                poses[k, 0],
+                gap,
+                inward,
+            )
+            found = 0
+            former = CLEAR
+            for block in range(0, count, at.LANES):
+                nearest = math.inf
+                innermost = math.inf
+                for i in range(block, block + at.LANES):
+                    nearest = min(nearest, gap[i])
+                    innermost = min(innermost, inward[i])
+                out[PENETRATION] = max(out[PENETRATION], -nearest)
+                kind = CLEAR
+                if nearest < way:
+                    kind = ON_FACE if innermost > way else TOUCHING
+                if kind != CLEAR and kind == former:
+                    pieces[k, r, found, 1] += at.LANES
+                elif kind != CLEAR:
+                    found += 1
+                    pieces[k, r, found, 0] = begin + block
+                    pieces[k, r, found, 1] = at.LANES
+                    pieces[k, r, found, 2] = kind
+                former = kind
+            pieces[k, r, 0, 0] = found
     return out
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
+def worst_crossing(
+    state, traits, trait_rows, row_index, spans, stride, fields, trait_fields, warp_inverse, weft_inverse
+):  # fmt: skip
+    """Row and column of the first crossing that is where no crossing can be."""
+    rows = row_index.shape[0]
+    most = (1.0 + LARGEST_STRAIN) ** 2
+    for j in range(rows):
+        begin = spans[row_index[j], 0]
+        row = row_index[j] * fields * stride
+        above = row_index[min(j + 1, rows - 1)] * fields * stride
+        trait = trait_rows[row_index[j]] * trait_fields * stride
+        for i in range(begin, min(begin + spans[row_index[j], 1], stride - 1)):
+            if traits[trait + i + at.AREA * stride] <= 0.0:
+                continue
+            speed = 0.0
+            warp = 0.0
+            weft = 0.0
+            for c in range(3):
+                p = c * stride + i
+                speed += state[row + p + at.VELOCITY * stride] ** 2
+                warp += ((state[row + p + 1] - state[row + p]) * warp_inverse) ** 2
+                weft += ((state[above + p] - state[row + p]) * weft_inverse) ** 2
+            place = state[row + i] + state[row + stride + i] + state[row + 2 * stride + i]
+            if not (speed < LARGEST_SPEED**2 and math.isfinite(place)):
+                return j, i
+            if traits[trait + i + at.WARP_LINE * stride] > 0.0 and warp > most:
+                return j, i
+            if traits[trait + i + at.WEFT_LINE * stride] > 0.0 and weft > most:
+                return j, i
+    return 0, 0
 
 
 SAMPLES = 17
@@ -187,24 +295,23 @@ def largest_on(coefficients, degree, pieces, width, end_slope, end):
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True)
-def contact_forces(rows, first_tool, tool_table, poses):
+def contact_forces(rows, areas, grip, tool_table, poses):
     """Force of all tools on each crossing [N], shape [rows, columns, 3], from fields of shape [rows, fields,
-    columns].
+    columns], the area of each crossing and its friction traction with each tool.
     """
     count, _, columns = rows.shape
     total = np.zeros((count, columns, 3))
     for j in range(count):
         for i in range(columns):
-            area = rows[j, at.AREA, i]
+            area = areas[j, i]
             x, y, z = rows[j, 0, i], rows[j, 1, i], rows[j, 2, i]
             away = math.sqrt(x * x + y * y)
             for k in range(tool_table.shape[0]):
                 t = tool_table[k]
                 distance, normal_s, normal_z = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
-                press = t[6] * area * max(t[5] - distance, 0.0)
+                press = t[6] * max(t[5] - distance, 0.0)
                 radial = press * normal_s / max(away, 1e-12)
-                field = first_tool + at.TOOL_FIELDS * k
-                total[j, i, 0] += radial * x + rows[j, field, i]
-                total[j, i, 1] += radial * y + rows[j, field + 1, i]
-                total[j, i, 2] += press * normal_z + rows[j, field + 2, i]
+                total[j, i, 0] += area * (radial * x + grip[j, k, 0, i])
+                total[j, i, 1] += area * (radial * y + grip[j, k, 1, i])
+                total[j, i, 2] += area * (press * normal_z + grip[j, k, 2, i])
     return total

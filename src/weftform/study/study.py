@@ -62,7 +62,8 @@ class Study:
         study
             A shipped name (``weftform studies``) or the path of a TOML file.
         changes
-            ``dotted.key=value`` texts, or a mapping of dotted keys to values.
+            ``dotted.key=value`` texts, or a mapping of dotted keys to values. A card's file is looked for from the
+            current folder here, and next to the study where the study itself names it.
 
         Raises
         ------
@@ -80,7 +81,7 @@ class Study:
         values, text = read_toml(path, StudyError)
         pairs = changes.items() if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
         for key, value in pairs:
-            values = _changed(values, key.split("."), value)
+            values = _changed(values, key.split("."), _from_here(key, value))
         made = cls(_validated(values, path, text), path.resolve())
         try:
             made.check()
@@ -274,6 +275,13 @@ def _split_change(change: str) -> tuple[str, Any]:
         return key.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
+
+
+def _from_here(key: str, value: Any) -> Any:
+    """The value of a change; the file of a card as the shell or script that gives it sees it."""
+    if key == "fabric.card" and isinstance(value, str | Path) and str(value).endswith(".toml"):
+        return str(Path(value).absolute())
+    return value
 
 
 def _changed(values: dict[str, Any], path: list[str], value: Any) -> dict[str, Any]:
