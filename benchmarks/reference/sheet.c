@@ -55,10 +55,13 @@ INLINE double most(double a, double b) { return a > b ? a : b; }
 
 INLINE double horner(const double *c, int degree, double x)
 {
-    double v = c[0];
+    double squared = x * x, v = c[0], w = c[1];
 #pragma GCC unroll 32
-    for (int k = 1; k <= degree; k++) v = v * x + c[k];
-    return v;
+    for (int k = 2; k < degree; k += 2) {
+        v = v * squared + c[k];
+        w = w * squared + c[k + 1];
+    }
+    return degree > 1 && degree % 2 == 0 ? v * squared + (w * x + c[degree]) : v * x + w;
 }
 
 INLINE double law(const double *c, int degree, const double *end, double x)
