@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from weftform.cli.bench import bench
 from weftform.cli.cards import cards
 from weftform.cli.check import check
 from weftform.cli.compare import compare
@@ -28,5 +29,6 @@ VERBS: dict[str, Callable[..., Any]] = {
     "cards": cards,
     "identify": identify,
     "reproduce": reproduce,
+    "bench": bench,
     "doctor": doctor,
 }

@@ -1,0 +1,58 @@
+"""How long it takes until the first step is made, and how long a whole run takes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from weftform.errors import WeftformError
+
+FIRST_STEP = """
+from weftform.cases import case_of
+from weftform.solver import Simulation
+from weftform.study import Study
+simulation = Simulation(case_of(Study.load("hemisphere-0-90")).problem(), {threads})
+simulation.advance_to(simulation.step)
+"""
+
+
+def start_up(threads: int) -> dict[str, float]:
+    """Wall time [s] from the start of the process to the end of the first step of the shipped hemisphere.
+
+    Once with an empty cache of compiled kernels, which is filled, and three times with it (the least counts).
+    """
+    with tempfile.TemporaryDirectory() as cache:
+        cold = _seconds([sys.executable, "-c", FIRST_STEP.format(threads=threads)], cache)
+        warm = min(_seconds([sys.executable, "-c", FIRST_STEP.format(threads=threads)], cache) for _ in range(3))
+    return {"cold_s": round(cold, 3), "warm_s": round(warm, 3), "compile_s": round(cold - warm, 3)}
+
+
+def whole_run(figures: bool) -> dict[str, float]:
+    """Wall time [s] of ``weftform run hemisphere-0-90`` from start to end of the process, and of its time loop."""
+    command = [sys.executable, "-c", "from weftform.cli import main; main()", "run", "hemisphere-0-90", "--out"]
+    more = [] if figures else ["--no-figures"]
+    with tempfile.TemporaryDirectory() as cache:
+        best: dict[str, float] = {}
+        for k in range(3):
+            with tempfile.TemporaryDirectory() as out:
+                spent = _seconds([*command, str(Path(out) / "run"), *more], cache)
+                loop = json.loads((Path(out) / "run" / "summary.json").read_text())["wall_s"]
+            # the first fills the cache
+            if k and (not best or spent < best["process_s"]):
+                best = {"process_s": round(spent, 3), "loop_s": round(loop, 3), "rest_s": round(spent - loop, 3)}
+    return best
+
+
+def _seconds(command: list[str], cache: str) -> float:
+    began = time.perf_counter()
+    done = subprocess.run(
+        command, env={**os.environ, "NUMBA_CACHE_DIR": cache}, capture_output=True, text=True, check=False
+    )
+    if done.returncode not in (0, 1):
+        raise WeftformError(f"`{' '.join(command[:3])} ...` failed: {done.stderr.strip()[-300:]}")
+    return time.perf_counter() - began
