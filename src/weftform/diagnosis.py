@@ -50,7 +50,7 @@ class Finding:
 
 def diagnose(*, quick: bool = False) -> list[Finding]:
     """All checks; with ``quick`` without the tiny run and the rendering."""
-    checks: list[Callable[[], Finding]] = [_python, _versions, _threads, _kernel_folder, _writing]
+    checks: list[Callable[[], Finding]] = [_python, _versions, _threads, _gpu, _kernel_folder, _writing]
     if not quick:
         checks += [_tiny_run, _drawing, _rendering]
     return [_guarded(check) for check in checks]
@@ -98,6 +98,17 @@ def _threads() -> Finding:
         most <= available,
         "more threads than processors: unset NUMBA_NUM_THREADS",
     )
+
+
+def _gpu() -> Finding:
+    """A GPU is optional, so that there is none is no failure."""
+    from weftform.errors import DeviceError
+    from weftform.solver.cuda.gpu import find_gpu
+
+    try:
+        return Finding("GPU", f"{find_gpu()} (weftform run --device cuda)", True)
+    except DeviceError as problem:
+        return Finding("GPU", f"none to use: {problem.message}; runs compute on the processor", True)
 
 
 def _kernel_folder() -> Finding:

@@ -70,6 +70,10 @@ class ResultError(WeftformError):
     """A result folder that cannot be read or written."""
 
 
+class DeviceError(WeftformError):
+    """A device that was asked for and cannot compute here."""
+
+
 class MeasurementError(WeftformError):
     """A file of measurements that cannot be used."""
 

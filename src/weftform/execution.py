@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from weftform.cases import Case, case_of
-from weftform.errors import ResultError, StudyError, UnstableRun
+from weftform.errors import DeviceError, ResultError, StudyError, UnstableRun
 from weftform.processors import crowding, usable_processors
 from weftform.result import Result
 from weftform.result.fields import Fields
@@ -71,6 +71,29 @@ class Progress:
 
 Watch = Callable[[Progress], None]
 
+Device = Literal["cpu", "cuda"]
+"""Where the time loop runs: this machine's processors, or a GPU."""
+
+
+def check_device(device: str, threads: int | None = None) -> None:
+    """Make sure that a device can be used, before anything is written.
+
+    Raises
+    ------
+    DeviceError
+        There is no such device, none on this machine, or threads are asked of a GPU.
+    """
+    if device not in get_args(Device):
+        raise DeviceError("no such device", key="--device", expected="cpu or cuda", got=device)
+    if device == "cuda":
+        if threads is not None:
+            raise DeviceError(
+                "threads are of the processor", key="--threads", expected="none with --device cuda", got=str(threads)
+            )
+        from weftform.solver.cuda.gpu import find_gpu
+
+        find_gpu()
+
 
 def threads_for(cells: int, wanted: int | None) -> int:
     """Threads to use: those asked for, or as many as pay for the size of the blank.
@@ -101,6 +124,7 @@ def run(
     out: str | Path,
     *,
     threads: int | None = None,
+    device: Device = "cpu",
     resume: bool = False,
     watch: Watch | None = None,
 ) -> Result:
@@ -114,6 +138,8 @@ def run(
         Result folder; created, or cleared of a former result.
     threads
         Bands of rows computed in parallel; chosen by the size of the blank without. The result does not depend on it.
+    device
+        ``cpu``, or ``cuda`` for a GPU (needs ``weftform[cuda]``); threads count on the processor only.
     resume
         Go on from the checkpoint of an interrupted run in ``out``.
     watch
@@ -125,7 +151,7 @@ def run(
 
     Raises
     ------
-    StudyError, CardError, ResultError
+    StudyError, CardError, ResultError, DeviceError
         Nothing was written.
     UnstableRun
         The run blew up; the result folder holds all that was computed before.
@@ -135,16 +161,19 @@ def run(
     if not isinstance(study, Study):
         study = Study.load(study)
     out = Path(out)
+    check_device(device, threads)
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
-    Run(case_of(study), out, threads, watch, resume).go()
+    Run(case_of(study), out, threads, watch, resume, device).go()
     return Result.open(out)
 
 
 class Run:
     """One run of a case."""
 
-    def __init__(self, case: Case, out: Path, threads: int, watch: Watch | None, resume: bool) -> None:
+    def __init__(
+        self, case: Case, out: Path, threads: int, watch: Watch | None, resume: bool, device: Device = "cpu"
+    ) -> None:
         self.case = case
         self.study = case.study
         self.out = out
@@ -153,7 +182,7 @@ class Run:
         self.columns = [*COLUMNS, *case.columns]
         if watch is not None:
             watch(Progress(0.0, 0.0, 0, 0.0, math.nan, compiling=True))
-        self.simulation = Simulation(case.problem(), threads)
+        self.simulation = Simulation(case.problem(), threads, device)
         self.rows: list[dict[str, float]] = []
         self._last_sound = self._fields()
         self.peak_penetration = 0.0
@@ -216,6 +245,12 @@ class Run:
             self.wall = time.perf_counter() - self._started
             self._loop_s += time.perf_counter() - begun
             self._processor_s += time.process_time() - cpu
+
+    def _waiting(self) -> list[str]:
+        """What to say where threads waited for processors; where a GPU computes, waiting is what they do."""
+        if self.simulation.device != "cpu":
+            return []
+        return crowding(self.simulation.bands, usable_processors(), self._processor_s, self._loop_s)
 
     def _warm_up(self) -> None:
         """Compile, or load from the cache, before the clock starts."""
@@ -315,13 +350,15 @@ class Run:
             "notes": [
                 *self.case.warnings(),
                 *beyond_the_laws(fields),
-                *crowding(simulation.bands, usable_processors(), self._processor_s, self._loop_s),
+                *self._waiting(),
             ],
             "cells": grid.cell_count,
             "steps": simulation.steps,
             "wall_s": self.wall,
             "ns_per_cell_step": self._rate(self.wall),
             "threads": simulation.bands,
+            "device": simulation.device,
+            "device_name": simulation.device_name,
             "energy": energy,
             "shear_angle_deg": fields.shear_statistics(),
             "penetration_mm": self.peak_penetration,
@@ -453,4 +490,4 @@ def _versions() -> str:
     )
 
 
-__all__ = ["Progress", "Run", "run", "threads_for"]
+__all__ = ["Device", "Progress", "Run", "check_device", "run", "threads_for"]

@@ -16,7 +16,6 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 from shapely.geometry import Polygon
 
 from weftform.blank import outline as shapes
@@ -471,9 +470,22 @@ def _best_cells(grid: YarnGrid, part: Polygon) -> NDArray[np.int8]:
 
 def _one_piece(cells: NDArray[np.int8]) -> NDArray[np.int8]:
     """Drop crumbs: cells that share no side with the largest piece."""
+    if _rows_overlap(cells != Cell.ABSENT):
+        return cells
+    from scipy import ndimage  # half a second that most blanks do not need
+
     pieces, count = ndimage.label(cells != Cell.ABSENT)
     if count <= 1:
         return cells
     sizes = np.bincount(pieces.ravel())
     sizes[0] = 0
     return np.where(pieces == sizes.argmax(), cells, np.int8(Cell.ABSENT))
+
+
+def _rows_overlap(there: NDArray[np.bool_]) -> bool:
+    """Whether each row is one run of cells and meets the next: then they are all one piece."""
+    there = there[there.any(axis=1).argmax() : len(there) - there[::-1].any(axis=1).argmax()]
+    first = there.argmax(axis=1)
+    last = there.shape[1] - there[:, ::-1].argmax(axis=1)
+    whole = there.sum(axis=1) == last - first
+    return bool(whole.all() and (np.maximum(first[1:], first[:-1]) < np.minimum(last[1:], last[:-1])).all())

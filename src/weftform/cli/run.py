@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from weftform.cli.options import Changes, StudyName
 
 if TYPE_CHECKING:
-    from weftform.execution import Progress, Watch
+    from weftform.execution import Device, Progress, Watch
 
 
 def run(
@@ -23,6 +23,10 @@ def run(
     threads: Annotated[
         int | None, typer.Option("--threads", metavar="N", help="Threads; chosen by the size of the blank without.")
     ] = None,
+    device: Annotated[
+        str,
+        typer.Option("--device", metavar="cpu|cuda", help="Compute on the processor, or on a GPU (weftform[cuda])."),
+    ] = "cpu",
     resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted run in DIR.")] = False,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Do not draw the figures.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress bar.")] = False,
@@ -40,7 +44,9 @@ def run(
     display = ProgressDisplay(enabled=not quiet)
     try:
         with display:
-            result = execute(loaded, folder, threads=threads, resume=resume, watch=display.watch)
+            result = execute(
+                loaded, folder, threads=threads, device=cast("Device", device), resume=resume, watch=display.watch
+            )
     except KeyboardInterrupt:
         typer.secho(f"\ninterrupted; what was computed is in {folder}", fg="yellow", err=True)
         typer.echo(f"go on with: weftform run {study} --out {folder} --resume", err=True)
@@ -67,8 +73,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
     shear, energy = summary["shear_angle_deg"], summary["energy"]
     lines = [
         f"study      {summary['study']}: {summary['cells']} cells, {summary['steps']} steps in {summary['wall_s']:.2f} s "
-        f"({summary['ns_per_cell_step']:.0f} ns per cell per step, {summary['threads']} thread"
-        f"{'s' if summary['threads'] > 1 else ''})",
+        f"({summary['ns_per_cell_step']:.3g} ns per cell per step, {_computed_on(summary)})",
         f"shear      largest {shear['max']:.2f} deg, mean {shear['mean']:.2f} deg",
     ]
     if "punch_force_N" in summary:
@@ -84,6 +89,12 @@ def _report(summary: dict[str, Any]) -> list[str]:
         f"{100 * energy['kinetic_over_internal']:.2g} % of internal"
     )
     return lines
+
+
+def _computed_on(summary: dict[str, Any]) -> str:
+    if summary["device"] == "cuda":
+        return f"on {summary['device_name']}"
+    return f"{summary['threads']} thread{'s' if summary['threads'] > 1 else ''}"
 
 
 class ProgressDisplay:
@@ -128,5 +139,5 @@ class ProgressDisplay:
             description="running",
             completed=progress.share,
             detail=f"{progress.displacement:6.2f} mm  step {progress.steps:,}  "
-            f"{progress.ns_per_cell_step:.0f} ns/cell  {left}",
+            f"{progress.ns_per_cell_step:.3g} ns/cell  {left}",
         )

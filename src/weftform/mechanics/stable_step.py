@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-from weftform.mechanics.compiled import scalar
 
-
-@scalar
 def crossing_stiffness(warp: float, weft: float, membrane: float, sine: float) -> float:
     """Largest eigenvalue of the stiffness that opposes a zig-zag of one crossing [N/mm].
 
@@ -21,7 +18,6 @@ def crossing_stiffness(warp: float, weft: float, membrane: float, sine: float) -
     return mean + math.sqrt(half * half + warp * weft * sine * sine) + membrane
 
 
-@scalar
 def stable_step(crossing: float, contact: float, mass: float, viscosity: float = 0.0) -> float:
     """Largest step [s] of central differences: ``2 / omega`` with ``omega^2 = (4 crossing + contact) / mass``.
 

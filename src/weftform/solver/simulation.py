@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import platform
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,9 @@ from weftform.solver.machine import Machine
 from weftform.solver.material import Material, largest
 from weftform.solver.problem import Ledger, Problem
 from weftform.solver.sheet import Sheet, inertia_area
+
+if TYPE_CHECKING:
+    from weftform.solver.cuda.driver import CudaDriver
 
 Floats = NDArray[np.float64]
 
@@ -39,13 +44,21 @@ class Simulation:
         What to simulate.
     threads
         Bands of rows computed in parallel; the result does not depend on it.
+    device
+        Where the steps are computed: ``cpu``, or ``cuda`` for a GPU (:mod:`weftform.solver.cuda`).
+
+    Raises
+    ------
+    DeviceError
+        A GPU was asked for and there is none that can be used.
     """
 
-    def __init__(self, problem: Problem, threads: int = 1) -> None:
+    def __init__(self, problem: Problem, threads: int = 1, device: Literal["cpu", "cuda"] = "cpu") -> None:
         grid, fabric = problem.grid, problem.fabric
         self.problem = problem
+        self.device = device
         self.rows, self.columns = grid.shape
-        self.bands = max(1, min(threads, self.rows // 4))
+        self.bands = max(1, min(threads, self.rows // 4)) if device == "cpu" else 1
         self.density = fabric.areal_density * problem.settings.mass_scaling
         self.material = Material(fabric, grid, problem.settings.hourglass)
         self.layout = Layout(
@@ -57,6 +70,11 @@ class Simulation:
         )
         self.sheet = Sheet(grid, self.layout, self.bands, fabric.thickness, self.density)
         self.machine = Machine(problem, self.sheet)
+        self._driver: CudaDriver | None = None
+        if device == "cuda":
+            from weftform.solver.cuda.driver import CudaDriver
+
+            self._driver = CudaDriver(problem, self.layout, self.material, self.sheet, self.machine, self.density)
         self.clock = np.zeros(loop.CLOCK_COLUMNS)
         self.clock[loop.C_INERTIA] = 1.0
         self.largest_inertia = 1.0
@@ -154,6 +172,8 @@ class Simulation:
 
     def _advance(self, steps: int, stop: float) -> int:
         settings = self.problem.settings
+        if self._driver is not None:
+            return self._driver.advance(self.clock, steps, stop)
         if self.bands > 1:
             import numba
 
@@ -175,15 +195,20 @@ class Simulation:
 
     def _survey(self) -> Floats:
         layout, sheet, machine, material = self.layout, self.sheet, self.machine, self.material
+        reach, margin = SURVEY_EVERY * self.clock[loop.C_STEP], CONTACT_MARGIN * self.problem.fabric.thickness
+        if self._driver is not None:
+            return self._driver.survey(reach, SURVEY_EVERY, margin)
         found: Floats = survey.survey(
             sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index, sheet.spans,
             layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools,
             material.warp_inverse, material.weft_inverse, machine.tools, machine.poses, machine.pieces,
-            SURVEY_EVERY * self.clock[loop.C_STEP], SURVEY_EVERY, CONTACT_MARGIN * self.problem.fabric.thickness,
+            reach, SURVEY_EVERY, margin,
         )  # fmt: skip
         return found
 
     def _enter_ledger(self) -> Floats:
+        if self._driver is not None:
+            return self._driver.enter_ledger()
         layout, sheet, machine, material = self.layout, self.sheet, self.machine, self.material
         grid = self.problem.grid
         warp, weft, shear = material.laws
@@ -207,12 +232,16 @@ class Simulation:
 
     def compile(self) -> None:
         """Compile the time loop, or load it from the cache, by calling it for no step."""
+        if self._driver is not None:
+            self._driver.compile()
+            return
         clock = self.clock.copy()
         self._advance(0, 0.0)
         self.clock[:] = clock
 
     def checkpoint(self) -> dict[str, Floats]:
         """Everything that :meth:`restore` needs to go on."""
+        self._sync()
         return {
             "fields": self.sheet.state[self.sheet.row_index],
             "poses": self.machine.poses.copy(),
@@ -248,10 +277,26 @@ class Simulation:
         self._surveys = int(saved["surveys"][0])
         self.machine.heats[self.sheet.row_index] = saved["heats"]
         self.machine.grip[self.sheet.row_index] = saved["grip"]
+        self._send()
         self._before = saved["before"]
         self.last = self._survey()
 
+    def _sync(self, *parts: str) -> None:
+        """Where a GPU computes, bring parts of sheet and machine up to date, or all."""
+        if self._driver is not None:
+            self._driver.sync(*parts)
+
+    def _send(self) -> None:
+        """Where a GPU computes, hand over what has changed here."""
+        if self._driver is not None:
+            self._driver.send()
+
     # -- looking ---------------------------------------------------------------------------------------------------
+
+    @property
+    def device_name(self) -> str:
+        """What computes the steps: the processor's architecture, or the GPU."""
+        return platform.machine() if self._driver is None else self._driver.gpu.name
 
     @property
     def time(self) -> float:
@@ -271,18 +316,22 @@ class Simulation:
     @property
     def positions(self) -> Floats:
         """Positions of the crossings [mm], shape [rows, columns, 3]; flat where they are not part of the blank."""
+        self._sync("moving")
         grid = self.problem.grid
         return np.where(grid.active[..., None], self.sheet.vectors(at.POSITION), grid.flat)
 
     @property
     def velocities(self) -> Floats:
         """Velocities of the crossings half a step ago [mm/s], shape [rows, columns, 3]."""
+        self._sync("moving")
         return self.sheet.vectors(at.VELOCITY)
 
     @velocities.setter
     def velocities(self, values: Floats) -> None:
+        self._sync()
         for c in range(3):
             self.sheet.state[self.sheet.row_index, at.VELOCITY + c, : self.columns] = values[..., c]
+        self._send()
 
     @property
     def masses(self) -> Floats:
@@ -292,6 +341,7 @@ class Simulation:
     @property
     def driven_forces(self) -> Floats:
         """Force that moves each driven crossing, as of the last step [N], shape [nodes, 3]; zero where it is free."""
+        self._sync("kept")
         flat = self.sheet.state.reshape(-1)
         first = self.layout.force * self.layout.stride
         inner = np.stack([flat[self.machine.nodes + first + c * self.layout.stride] for c in range(3)], axis=-1)
@@ -312,6 +362,7 @@ class Simulation:
     @property
     def contact_forces(self) -> Floats:
         """Force of all tools on each crossing [N], shape [rows, columns, 3]."""
+        self._sync("moving", "grip")
         sheet = self.sheet
         rows = np.ascontiguousarray(sheet.state[sheet.row_index][:, :, : self.columns])
         forces: Floats = survey.contact_forces(
@@ -327,6 +378,7 @@ class Simulation:
     def ledger(self) -> Ledger:
         """Energies now [mJ]."""
         entry = self._enter_ledger()
+        self._sync("heats")
         tools = self.machine.poses
         mass = self.machine.tools[:, loop.T_MASS]
         tangential = self.machine.tools[:, loop.T_TANGENTIAL] * self.machine.tools[:, loop.T_STIFFNESS]
