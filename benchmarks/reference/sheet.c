@@ -384,7 +384,12 @@ void advance(Sheet *q, int64_t steps)
         break;
 #define NODES3(a, b) NODES(a, b, 0) NODES(a, b, 1) NODES(a, b, 2)
 #define NODES9(a) NODES3(a, 0) NODES3(a, 1) NODES3(a, 2)
-                switch (code) { NODES9(0) NODES9(1) NODES9(2) }
+                switch (code) {
+                    NODES9(0) NODES9(1)
+                default: /* the flat face of a punch: a hemisphere has none, and TOUCHING holds for it too */
+                    crossings(q, row, j, begin, end, (const int[]){1, 1, 1}, q->step, q->last_step, kick, keep, damping,
+                              reactions);
+                }
             }
 #endif
         }

@@ -8,7 +8,7 @@ import pytest
 from weftform.benchmark import bench as whole
 from weftform.benchmark.reference import Reference, source_file
 from weftform.benchmark.sheet import MAKERS, formed_sheet, formed_source, same_sheet
-from weftform.errors import WeftformError
+from weftform.errors import DeviceError, WeftformError
 from weftform.solver import loop
 
 gcc = pytest.mark.skipif(
@@ -68,6 +68,16 @@ def test_source_is_there():
 def test_unknown_device_is_refused_before_anything_is_timed():
     with pytest.raises(WeftformError, match="cannot be timed"):
         whole.bench(sides=(SIDE,), devices=("abacus",))
+
+
+def test_a_missing_gpu_is_said_before_anything_is_timed(monkeypatch):
+    def none():
+        raise DeviceError("there is no GPU")
+
+    monkeypatch.setattr(whole, "find_gpu", none)
+    monkeypatch.setattr(whole, "describe", lambda numbers: pytest.fail("timing has begun"))
+    with pytest.raises(DeviceError, match="no GPU"):
+        whole.bench(sides=(SIDE,), devices=("cuda",))
 
 
 def test_a_device_is_added_by_one_entry(monkeypatch, source):

@@ -14,6 +14,7 @@ from weftform.benchmark.measure import Timed, reference_case, take_laps, weftfor
 from weftform.benchmark.reference import ReferenceMissing
 from weftform.benchmark.sheet import MAKERS, SOURCE_CELLS, formed_sheet, formed_source
 from weftform.errors import WeftformError
+from weftform.solver.cuda.gpu import find_gpu
 
 SIDES = (56, 200, 700)
 QUICK_SIDES = (56,)
@@ -74,7 +75,7 @@ def bench(
     Raises
     ------
     WeftformError
-        A device that is not there.
+        A device that is not there; nothing has been timed.
     """
     say: Watch = watch or (lambda what, share: None)
     unknown = [device for device in devices if device not in MAKERS]
@@ -82,6 +83,8 @@ def bench(
         raise WeftformError(
             "this device cannot be timed", key="--device", expected=" or ".join(MAKERS), got=", ".join(unknown)
         )
+    if "cuda" in devices:
+        find_gpu()
     numbers = sorted(set(threads or (1, processors())))
     notes: list[str] = []
     say("peaks of the machine", 0.0)

@@ -156,7 +156,7 @@ def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, dev
         return made, loop + row, loop
 
     memory = (start["fields"].nbytes + start["grip"].nbytes + simulation.sheet.traits.nbytes) / side**2
-    work = arithmetic(simulation, *contact_shares(simulation))
+    work = arithmetic(sheet, *contact_shares(sheet))
     return Timed(WEFTFORM, side, threads, contact, device, lap, memory, work)
 
 

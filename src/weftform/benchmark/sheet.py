@@ -60,7 +60,10 @@ def formed_source(cells: int = SOURCE_CELLS, part: float = PART_OF_STROKE) -> Si
     return simulation
 
 
-MAKERS: dict[str, Callable[[Problem, int], Simulation]] = {"cpu": Simulation}
+MAKERS: dict[str, Callable[[Problem, int], Simulation]] = {
+    "cpu": Simulation,
+    "cuda": lambda problem, threads: Simulation(problem, threads, "cuda"),
+}
 """What advances a problem on each device. Another device adds itself here; it has to restore checkpoints."""
 
 

@@ -13,7 +13,7 @@ from weftform.cli.options import AsJson
 def bench(
     as_json: AsJson = False,
     quick: Annotated[bool, typer.Option("--quick", help="56 x 56 cells only, half a minute.")] = False,
-    device: Annotated[list[str] | None, typer.Option("--device", help="cpu; may be given again.")] = None,
+    device: Annotated[list[str] | None, typer.Option("--device", help="cpu or cuda; may be given again.")] = None,
     threads: Annotated[list[int] | None, typer.Option("--threads", help="1 and all processors without.")] = None,
     markdown: Annotated[
         Path | None, typer.Option("--markdown", metavar="FILE", help="Write the performance page.")

@@ -156,6 +156,8 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     driven = layout.driven
     trait_length = layout.traits * layout.stride
     force_field = layout.force
+    # In the loop this is a constant, so that the disk cache tells the two apart: its key does not hold ``parallel``.
+    threaded = int(parallel)
     warp_degree, warp_pieces = layout.warp_degree, layout.warp_pieces
     weft_degree, weft_pieces = layout.weft_degree, layout.weft_pieces
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
@@ -170,6 +172,7 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
         environment = flush_subnormals()
         bands = bounds.shape[0]
+        assert threaded or bands == 1
         rows = pieces.shape[1]
         done = 0
         amplitude = np.zeros(mode_motion.shape[0])
