@@ -27,7 +27,7 @@ TINY = (
 )
 """Changes that make the shipped hemisphere a run of a fraction of a second."""
 
-TINY_SHEAR_DEG = 1.2199
+TINY_SHEAR_DEG = 1.2204
 """Mean shear angle of that run. Stored from a run whose default-size sibling meets the kinematic net and the closed forms (tests);
 it is compared, not trusted: a difference means that this machine computes something else."""
 

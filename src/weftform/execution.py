@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
@@ -232,6 +233,15 @@ class Run:
         except UnstableRun as problem:
             self._finish(writer, problem.message)
             raise
+        except OSError as problem:
+            # also what h5py makes of a full disk; what little still fits is worth more than none
+            with contextlib.suppress(OSError):
+                self._checkpoint(self.simulation.time)
+            raise ResultError(
+                f"the result could not be written ({problem.strerror or problem})",
+                file=self.out,
+                hint="make room and go on with --resume if there is a checkpoint.npz, or run anew with another --out",
+            ) from None
         finally:
             writer.close()
 
@@ -325,9 +335,10 @@ class Run:
 
     def _finish(self, writer: ResultWriter, status: str) -> None:
         if status != "done" and self._sound:
+            # the checkpoint before the frame, which may have to wait for slow writing
             writer.row(self._enter_row())
-            self._frame(writer)
             self._checkpoint(self.simulation.time)
+            self._frame(writer)
         writer.outline(self._last_sound)
         writer.summary(self.summary(status))
 

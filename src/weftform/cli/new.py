@@ -20,6 +20,7 @@ def new(
 ) -> None:
     """Write a commented study to start from. Example: weftform new hemisphere my.toml"""
     import difflib
+    import json
 
     from weftform.errors import StudyError
     from weftform.study.shipped import shipped_studies
@@ -40,6 +41,7 @@ def new(
         shipped[name]
         .read_text(encoding="utf-8")
         .replace(f"weftform run {name} --out results/{name}", f"weftform run {file.name} --out results/{file.stem}")
+        .replace(f'name = "{name}"', f"name = {json.dumps(file.stem)}")
     )
     try:
         file.write_text(text, encoding="utf-8")

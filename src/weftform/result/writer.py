@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections import deque
@@ -146,6 +147,12 @@ class ResultWriter:
             self._pending.popleft().result()
 
     def _write_frame(self, time: float, displacement: float, fields: Fields, contact_force: Floats) -> None:
+        try:
+            self._append(time, displacement, fields, contact_force)
+        except RuntimeError as problem:  # of h5py, whose HDF5 says no more than that it cannot write
+            raise OSError(str(problem)) from None
+
+    def _append(self, time: float, displacement: float, fields: Fields, contact_force: Floats) -> None:
         points = fields.positions[self._active]
         node_shear = np.degrees(fields.node_shear[self._active])
         self._series.append(
@@ -181,9 +188,8 @@ class ResultWriter:
 
     def close(self) -> None:
         """Write what is pending and close all files."""
-        try:
-            self.settle()
-        finally:
-            self._worker.shutdown(wait=True, cancel_futures=True)
-            self._series.close()
-            self._history.close()
+        self._worker.shutdown(wait=True)
+        # a file that failed before fails again when it is closed; that was said already
+        for part in (self._series, self._history):
+            with contextlib.suppress(OSError, RuntimeError):
+                part.close()

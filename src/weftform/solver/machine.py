@@ -94,6 +94,28 @@ class Machine:
         self.mode_motion = np.asarray(driven.motions, np.int64)
         self.mode_kind = np.asarray(driven.kinds, np.int64)
 
+    def longest_way(self, time: float, span: float) -> float:
+        """The longest way that a tool can make from ``time`` on in ``span`` seconds [mm], as a bound.
+
+        Of a tool with a prescribed motion by its peak speed (:func:`weftform.mechanics.motion.soft_progress`), of one that
+        is pushed by its force alone.
+        """
+        longest = 0.0
+        for tool in self.tools:
+            motion = int(tool[loop.T_MOTION])
+            if motion < 0:
+                continue
+            knots = self.knots[motion]
+            times, values = self.times[motion, :knots], self.values[motion, :knots]
+            if tool[loop.T_MASS] != 0.0:
+                pushed = 0.5 * np.abs(values).max() / tool[loop.T_MASS] * span * span
+                longest = max(longest, float(pushed)) if np.isfinite(pushed) else longest
+                continue
+            ways = np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) / (1.0 - self.ramp)
+            soon = (times[1:] > time) & (times[:-1] < time + span)
+            longest = max(longest, float((ways * soon).max(initial=0.0)) * span)
+        return longest
+
     def motion(self, index: int, time: float) -> float:
         """Value of a motion at a time."""
         return float(motion_value(self.times[index], self.values[index], self.knots[index], self.ramp, time))

@@ -88,13 +88,10 @@ class Simulation:
         self._loop = loop.compile_loop(self.layout, self.bands > 1)
 
     def _choose_step(self) -> None:
-        s, grid, material = self.last, self.problem.grid, self.material
-        # Tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the
-        # truth.
-        # and as far ahead as they moved since the last survey, so that fast straining does not outrun the step
-        ahead = s + np.maximum(s - self._before, 0.0)
-        _, warp_slope = largest(material.warp, ahead[survey.WARP_STRAIN])
-        _, weft_slope = largest(material.weft, ahead[survey.WEFT_STRAIN])
+        grid, material, ahead = self.problem.grid, self.material, self._expected
+        # tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the truth
+        warp_force, warp_slope = largest(material.warp, ahead[survey.WARP_STRAIN])
+        weft_force, weft_slope = largest(material.weft, ahead[survey.WEFT_STRAIN])
         k_warp, k_weft = warp_slope / grid.warp_pitch, weft_slope / grid.weft_pitch
         t = min(ahead[survey.HALF_TANGENT], 1.0)
         sine = 2.0 * t / (1.0 + t * t)
@@ -102,13 +99,13 @@ class Simulation:
         modulus = 0.5 * (ratio + t * ratio_slope) * (1.0 + t * t) + t * ratio
         aspect = grid.cell_area / min(grid.warp_pitch, grid.weft_pitch) ** 2
         cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + sum(material.moduli))
-        crossing = stability.crossing_stiffness(k_warp, k_weft, cell, sine)
+        # a yarn under tension resists sideways with its force over its length
+        taut = max(warp_force, 0.0) / grid.warp_pitch + max(weft_force, 0.0) / grid.weft_pitch
+        crossing = stability.crossing_stiffness(k_warp, k_weft, cell + taut, sine)
         contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
         settings = self.problem.settings
-        # dashpots on the initial length grow with the square of the stretch
-        stretch = 1.0 + max(ahead[survey.WARP_STRAIN], ahead[survey.WEFT_STRAIN], 0.0)
         step = settings.safety * stability.stable_step(
-            crossing, contact, self.density * grid.cell_area, min(settings.viscosity * stretch**2, 0.45)
+            crossing, contact, self.density * grid.cell_area, settings.viscosity
         )
         scale = max(1.0, (settings.least_step / step) ** 2)
         if scale != self.clock[loop.C_INERTIA]:
@@ -117,7 +114,30 @@ class Simulation:
             self._inertia_work += 0.5 * self.density * added * float(self.last[survey.KINETIC])
             self.clock[loop.C_INERTIA] = scale
             self.largest_inertia = max(self.largest_inertia, scale)
-        self.clock[loop.C_STEP] = step * math.sqrt(scale)
+        self.clock[loop.C_STEP] = min(step * math.sqrt(scale), self._holder_step())
+
+    @property
+    def _expected(self) -> Floats:
+        """The last survey, with what grew since the one before growing on: so fast straining does not outrun the step."""
+        return self.last + np.maximum(self.last - self._before, 0.0)
+
+    def _viscosity(self) -> float:
+        """Share of critical damping of the dashpots, times the area of a cell.
+
+        They act on the initial length, so they grow with the square of the stretch; that much they are made weaker.
+        """
+        stretch = 1.0 + max(self._expected[survey.WARP_STRAIN], self._expected[survey.WEFT_STRAIN], 0.0)
+        return float(self.problem.settings.viscosity * self.problem.grid.cell_area / stretch**2)
+
+    def _holder_step(self) -> float:
+        """Stable step of the tools that are pushed, on the whole blank as their spring [s]."""
+        area = float(self.problem.grid.node_area.sum())
+        steps = [
+            self.problem.settings.safety * 2.0 * math.sqrt(row[loop.T_MASS] / (row[loop.T_STIFFNESS] * area))
+            for row in self.machine.tools
+            if row[loop.T_MASS] > 0.0
+        ]
+        return min(steps, default=math.inf)
 
     def _choose_holder_mass(self) -> None:
         area = float(self.problem.grid.node_area.sum())
@@ -173,7 +193,7 @@ class Simulation:
     def _advance(self, steps: int, stop: float) -> int:
         settings = self.problem.settings
         if self._driver is not None:
-            return self._driver.advance(self.clock, steps, stop)
+            return self._driver.advance(self.clock, steps, stop, self._viscosity())
         if self.bands > 1:
             import numba
 
@@ -189,13 +209,15 @@ class Simulation:
                 machine.times, machine.values, machine.knots, settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
                 self.clock, steps, stop, settings.damping, self.density,
-                settings.viscosity * self.problem.grid.cell_area,
+                self._viscosity(),
             )
         )  # fmt: skip
 
     def _survey(self) -> Floats:
         layout, sheet, machine, material = self.layout, self.sheet, self.machine, self.material
-        reach, margin = SURVEY_EVERY * self.clock[loop.C_STEP], CONTACT_MARGIN * self.problem.fabric.thickness
+        reach = SURVEY_EVERY * self.clock[loop.C_STEP]
+        # what a tool that starts now can push the fabric by is not in the speeds yet
+        margin = CONTACT_MARGIN * self.problem.fabric.thickness + 2.0 * machine.longest_way(self.time, reach)
         if self._driver is not None:
             return self._driver.survey(reach, SURVEY_EVERY, margin)
         found: Floats = survey.survey(

@@ -82,7 +82,6 @@ class CudaDriver:
         settings = problem.settings
         self.layout, self.sheet, self.machine = layout, sheet, machine
         self.rows, self.columns = sheet.rows, sheet.columns
-        self._viscosity = settings.viscosity * problem.grid.cell_area
         self._damping, self._density = settings.damping, density
         sums = layout.tools + layout.driven
         self.tile = SIMULATOR_TILE if SIMULATED else tile_for(sums)
@@ -167,17 +166,18 @@ class CudaDriver:
 
     # -- steps -------------------------------------------------------------------------------------------------------
 
-    def advance(self, clock: Floats, steps: int, stop: float) -> int:
+    def advance(self, clock: Floats, steps: int, stop: float, viscosity: float) -> int:
         """Make at most ``steps`` steps, up to the time ``stop``; returns the number made.
 
+        ``viscosity`` is that of the dashpots times the area of a cell [mm2].
         Clock, tools and driven crossings are brought up to date, as by the time loop of the processor.
         """
         with uninterrupted():
-            return self._advance(clock, steps, stop)
+            return self._advance(clock, steps, stop, viscosity)
 
-    def _advance(self, clock: Floats, steps: int, stop: float) -> int:
+    def _advance(self, clock: Floats, steps: int, stop: float, viscosity: float) -> int:
         machine = self.machine
-        plan = self._schedule(clock, steps, stop)
+        plan = self._schedule(clock, steps, stop, viscosity)
         made = len(plan) - 1
         if made == 0:
             return 0
@@ -215,7 +215,7 @@ class CudaDriver:
             driven, work,
         )  # fmt: skip
 
-    def _schedule(self, clock: Floats, steps: int, stop: float) -> Floats:
+    def _schedule(self, clock: Floats, steps: int, stop: float, viscosity: float) -> Floats:
         """What changes from step to step and is known before (``S_`` constants); moves the clock.
 
         One row per step and an empty one behind the last.
@@ -223,7 +223,7 @@ class CudaDriver:
         machine = self.machine
         times, values, knots, ramp = machine.times, machine.values, machine.knots, machine.ramp
         step, last_step, inertia = (float(clock[c]) for c in (C_STEP, C_LAST_STEP, C_INERTIA))
-        viscosity = self._viscosity * self._density * inertia / step
+        drag = viscosity * self._density * inertia / step
         rows: list[list[float]] = []
         while len(rows) < steps and clock[C_TIME] < stop:
             time = float(clock[C_TIME])
@@ -232,7 +232,7 @@ class CudaDriver:
             keep = (1.0 - loss) / (1.0 + loss)
             kick = mean / ((1.0 + loss) * inertia)
             damping = 0.25 * self._damping * self._density * inertia * mean
-            row = [step, last_step, kick, keep, damping, viscosity, 1.0 / (step * keep)]
+            row = [step, last_step, kick, keep, damping, drag, 1.0 / (step * keep)]
             for k, tool in enumerate(machine.tools):
                 motion = int(tool[T_MOTION])
                 at_time = time if tool[T_MASS] > 0.0 else time + step
