@@ -13,6 +13,7 @@ import pytest
 
 from weftform.cases import case_of
 from weftform.errors import CardError, ResultError, StudyError, UnstableRun
+from weftform.exchange.vtkhdf import Series
 from weftform.execution import COLUMNS, run, threads_for
 from weftform.result import Result
 from weftform.study import Study
@@ -356,3 +357,22 @@ def test_no_result_is_refused(tmp_path):
         Result.open(tmp_path / "nowhere")
     with pytest.raises(ResultError, match="missing"):
         Result.open(tmp_path)
+
+
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), RuntimeError("unable to extend file")])
+def test_full_disk_is_one_message_and_leaves_a_checkpoint(tmp_path, monkeypatch, failure):
+    """Frames are written beside the run: what fails there surfaces here, h5py's own kind of error included."""
+    append, calls = Series.append, []
+
+    def full(self, *arguments, **keywords):
+        calls.append(1)
+        if len(calls) > 2:
+            raise failure
+        append(self, *arguments, **keywords)
+
+    monkeypatch.setattr(Series, "append", full)
+    with pytest.raises(ResultError, match="could not be written"):
+        run(Study.load("hemisphere-0-90", SMALL), tmp_path / "out")
+    assert (tmp_path / "out" / "checkpoint.npz").exists()
+    monkeypatch.undo()
+    assert run(Study.load("hemisphere-0-90", SMALL), tmp_path / "out", resume=True).summary["status"] == "done"
