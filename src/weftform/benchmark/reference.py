@@ -18,7 +18,7 @@ from weftform.errors import WeftformError
 from weftform.solver import Simulation, loop
 from weftform.solver import layout as at
 from weftform.solver.sheet import aligned, inertia_area
-from weftform.solver.simulation import CONTACT_MARGIN, SURVEY_EVERY
+from weftform.solver.simulation import SURVEY_EVERY
 
 Floats = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ class Reference:
         if self.stride % 64 == 0:
             self.stride += 8
         self.tools = layout.tools
-        self._margin = CONTACT_MARGIN * simulation.problem.fabric.thickness
+        self._margin = simulation.search_margin
         saved = simulation.checkpoint()
         self._library = _compile(
             flags,
@@ -152,7 +152,7 @@ class Reference:
             warp_pitch=grid.warp_pitch, weft_pitch=grid.weft_pitch,
             warp_modulus=material.moduli[0], weft_modulus=material.moduli[1], hourglass=material.membrane[5],
             volume=grid.cell_area * fabric.thickness,
-            density=density, damping=settings.damping, viscous=settings.viscosity * grid.cell_area,
+            density=density, damping=settings.damping, viscous=simulation.viscosity,
             tools=self._address(self._tool_table), poses=self._address(self._poses), touching=self._address(self._touching),
             times=self._address(machine.times), values=self._address(machine.values),
             knots=self._address(machine.knots), most_knots=machine.times.shape[1],
@@ -200,8 +200,10 @@ class Reference:
             steps -= SURVEY_EVERY
 
     def follow(self, simulation: Simulation) -> None:
-        """Take over the length of the step and the mass scaling."""
+        """Take over the length of the step, the mass scaling, the dashpots and the margin of the contact search."""
         self._sheet.step = simulation.step
+        self._sheet.viscous = simulation.viscosity
+        self._margin = simulation.search_margin
         self._sheet.inertia_factor = simulation.clock[loop.C_INERTIA]
 
     @property

@@ -4,6 +4,9 @@ Energies of connectors, hourglass control and contact are functions of the state
 function of the state but, with constant thickness, has no potential, so its work is integrated with Simpson's
 rule from entry to entry. (Friction and damping heat are sums of the time loop.) The ledger therefore closes only if
 the time loop integrates the same physics.
+
+Sums run over the rows column by column, so that they do not depend on the bands. Loops over a row take one operation
+or law at a time, so that their code is short, whatever the degree of a law, and vectorised.
 """
 
 from __future__ import annotations
@@ -16,8 +19,10 @@ import numpy as np
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
-from weftform.mechanics.membrane import half_tangent, log_stretch, shear_stress
+from weftform.mechanics.membrane import half_tangent, shear_stress
 from weftform.solver import layout as at
+from weftform.solver.rows import U1
+from weftform.solver.vector_loops import row_loop, use_full_width
 
 KINETIC = 0
 CONNECTORS = 1
@@ -25,6 +30,159 @@ MEMBRANE = 2
 HOURGLASS = 3
 CONTACT = 4
 ENTRIES = 5
+
+
+@row_loop
+def polynomial_row(coefficients, degree, x, out, count):
+    """Polynomial of each place of a row, highest power first."""
+    use_full_width()
+    for i in range(count):
+        out[i] = coefficients[0]
+    for k in range(1, degree + 1):
+        c = coefficients[k]
+        for i in range(count):
+            out[i] = out[i] * x[i] + c
+
+
+@row_loop
+def kinetic_row(state, row, traits, trait, count, stride, density, total):
+    """Kinetic energy of the crossings."""
+    use_full_width()
+    s = np.uint64(stride)
+    vx = row + s * np.uint64(at.VELOCITY)
+    vy, vz = vx + s, vx + s + s
+    inertia = trait + s * np.uint64(at.INERTIA)
+    for i in range(count):
+        u, v, w = state[vx + i], state[vy + i], state[vz + i]
+        total[i] += 0.5 * density * traits[inertia + i] * (u * u + v * v + w * w)
+
+
+@row_loop
+def contact_energy_row(state, row, traits, trait, grip, held, count, stride, tool, tool_z, total):
+    """Energy of the penalty springs of a tool, normal and tangential."""
+    use_full_width()
+    s = np.uint64(stride)
+    area = trait + s * np.uint64(at.AREA)
+    side_s, s0, side_z, z0, radius = tool[0], tool[1], tool[2], tool[3], tool[4]
+    half_thickness, stiffness, tangential = tool[5], tool[6], tool[6] * tool[8]
+    for i in range(count):
+        x, y = state[row + i], state[row + s + i]
+        away = math.sqrt(x * x + y * y)
+        distance, _, _ = rounded_edge(away, state[row + s + s + i] - tool_z, side_s, s0, side_z, z0, radius)
+        depth = max(half_thickness - distance, 0.0)
+        fx, fy, fz = grip[held + i], grip[held + s + i], grip[held + s + s + i]
+        stick = (fx * fx + fy * fy + fz * fz) / tangential if depth > 0.0 else 0.0
+        a = traits[area + i]
+        total[i] += 0.5 * a * (stiffness * depth * depth + stick) if a > 0.0 else 0.0
+
+
+@row_loop
+def strain_row(state, row, other, count, stride, inverse, strain):
+    """Nominal strain of the connectors from one row to another place."""
+    use_full_width()
+    s = np.uint64(stride)
+    for i in range(count):
+        dx = state[other + i] - state[row + i]
+        dy = state[other + s + i] - state[row + s + i]
+        dz = state[other + s + s + i] - state[row + s + s + i]
+        strain[i] = math.sqrt(dx * dx + dy * dy + dz * dz) * inverse - 1.0
+
+
+@row_loop
+def connector_energy_row(traits, weight, count, pitch, law, degree, pieces, strain, inside, value, total):
+    """Stored energy of connectors; ``law`` = coefficients, integrals, width, slope beyond, slope in compression, and for a
+    law of one piece the coefficients of its integral over the strain.
+    """
+    width, end_slope, slack = law[2], law[3], law[4]
+    if pieces > 1:
+        for i in range(count):
+            w = traits[weight + i]
+            if w > 0.0:
+                total[i] += (
+                    w * pitch * connector_energy(law[0], law[1], degree, pieces, width, end_slope, slack, strain[i])
+                )
+        return
+    for i in range(count):
+        inside[i] = min(max(strain[i], 0.0), width)
+    polynomial_row(law[5], degree, inside, value, count)
+    at_end = 0.0
+    for k in range(degree + 1):
+        at_end = at_end * width + law[0][k]
+    for i in range(count):
+        beyond = max(strain[i] - width, 0.0)
+        push = min(strain[i], 0.0)
+        energy = value[i] * inside[i] + beyond * (at_end + 0.5 * end_slope * beyond) + 0.5 * slack * push * push
+        total[i] += traits[weight + i] * pitch * energy
+
+
+@row_loop
+def metric_row(
+    state, row, above, traits, trait, count, stride, weights, lower, left, half_cells, sign_x, sign_y,
+    warp_inverse, weft_inverse, stabilise, g11, g22, g12, hourglass,
+):  # fmt: skip
+    """Metric of the yarn directions of the cells above a row, and the energy of their hourglass control."""
+    use_full_width()
+    s = np.uint64(stride)
+    volume = trait + s * np.uint64(at.VOLUME)
+    mirror = trait + s * np.uint64(at.MIRROR)
+    mirror_z = trait + s * np.uint64(at.MIRROR_Z)
+    for i in range(count):
+        wl = weights[lower + i]
+        wa = weights[left + i]
+        a11 = 0.0
+        a22 = 0.0
+        a12 = 0.0
+        twist = 0.0
+        for c in range(3):
+            p = row + i + s * np.uint64(c)
+            q = above + i + s * np.uint64(c)
+            low, up = state[p + U1] - state[p], state[q + U1] - state[q]
+            start, end = state[q] - state[p], state[q + U1] - state[p + U1]
+            g1 = (wl * low + (1.0 - wl) * up) * warp_inverse
+            g2 = (wa * start + (1.0 - wa) * end) * weft_inverse
+            if half_cells:
+                # completed by its mirror image (blank.grid.mirrors)
+                share = traits[mirror + i]
+                image = traits[mirror_z + i] if c == 2 else share * (sign_x if c == 0 else sign_y)
+                g1, g2 = (1.0 - share) * g1 + image * g2, (1.0 - share) * g2 + image * g1
+            a11 += g1 * g1
+            a22 += g2 * g2
+            a12 += g1 * g2
+            twist += (up - low) * (up - low)
+        there = traits[volume + i] > 0.0
+        g11[i] = a11 if there else 1.0
+        g22[i] = a22 if there else 1.0
+        g12[i] = a12 if there else 0.0
+        whole = 16.0 * (wl * (1.0 - wl)) * (wa * (1.0 - wa))
+        hourglass[i] += 0.5 * stabilise * traits[volume + i] * whole * twist if there else 0.0
+
+
+@row_loop
+def log_row(g, count, series, terms, y, y2, out):
+    """``ln l`` from ``l^2`` (mechanics.membrane.log_stretch)."""
+    use_full_width()
+    for i in range(count):
+        y[i] = (g[i] - 1.0) / (g[i] + 1.0)
+        y2[i] = y[i] * y[i]
+    polynomial_row(series, terms - 1, y2, out, count)
+    for i in range(count):
+        out[i] *= y[i]
+
+
+@row_loop
+def shear_row(t, count, law, degree, pieces, inside, out):
+    """``tau`` by ``t = tan(gamma / 2)`` (mechanics.membrane.shear_stress)."""
+    use_full_width()
+    width, end_slope = law[2], law[3]
+    if pieces > 1:
+        for i in range(count):
+            out[i] = shear_stress(law[0], degree, pieces, width, end_slope, t[i])
+        return
+    for i in range(count):
+        inside[i] = min(abs(t[i]), width)
+    polynomial_row(law[0], degree, inside, out, count)
+    for i in range(count):
+        out[i] = t[i] * (out[i] + end_slope * max(abs(t[i]) - width, 0.0))
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
@@ -40,131 +198,92 @@ def enter_ledger(
         Mass per area, mass scaling included [tonne/mm2].
     shapes
         (warp degree, warp pieces, weft degree, weft pieces, shear degree, shear pieces).
+    grip
+        Friction tractions, shape [local rows, tools, 3, stride].
 
     Returns
     -------
     Energies [mJ], shape [ENTRIES].
     """
-    out = np.zeros(ENTRIES)
     rows = row_index.shape[0]
     wd, wp, fd, fp, sd, sp = shapes
-    length = fields * stride
+    length = np.uint64(fields * stride)
+    trait_length = np.uint64(trait_fields * stride)
+    s = np.uint64(stride)
+    count = np.uint64(columns)
+    cells = np.uint64(columns - 1)
+    sums = np.zeros((ENTRIES, stride))
+    scratch = np.zeros((16, stride))
+    t, to, tm, angle, work = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    e1, e2, tau, tau_old, tau_mid = scratch[5], scratch[6], scratch[7], scratch[8], scratch[9]
+    g11, g22, g12 = scratch[10], scratch[11], scratch[12]
+    x, y, z = scratch[13], scratch[14], scratch[15]
+    halves = np.full(stride, 0.5)
+    weights = traits if half_cells else halves
+    tractions = grip.reshape(-1)
     for j in range(rows):
-        base = row_index[j] * length
-        trait = trait_rows[row_index[j]] * trait_fields * stride
-        above = row_index[j + 1] * length if j < rows - 1 else base
-        for i in range(columns):
-            n = base + i
-            m = trait + i
-            area = traits[m + at.AREA * stride]
-            if area <= 0.0:
-                continue
-            x = state[n]
-            y = state[n + stride]
-            z = state[n + 2 * stride]
-            speed2 = state[n + 3 * stride] ** 2 + state[n + 4 * stride] ** 2 + state[n + 5 * stride] ** 2
-            out[KINETIC] += 0.5 * density * traits[m + at.INERTIA * stride] * speed2
-            away = math.sqrt(x * x + y * y)
-            for k in range(tools):
-                t = tool_table[k]
-                distance, _, _ = rounded_edge(away, z - poses[k, 0], t[0], t[1], t[2], t[3], t[4])
-                gap = distance - t[5]
-                stiffness = t[6] * area
-                if gap < 0.0:
-                    held = grip[row_index[j], k, :, i]
-                    stick = held[0] ** 2 + held[1] ** 2 + held[2] ** 2
-                    out[CONTACT] += 0.5 * stiffness * gap * gap + 0.5 * area * stick / (t[8] * t[6])
-            weight = traits[m + at.WARP_LINE * stride]
-            if weight > 0.0:
-                dx = state[n + 1] - x
-                dy = state[n + 1 + stride] - y
-                dz = state[n + 1 + 2 * stride] - z
-                strain = math.sqrt(dx * dx + dy * dy + dz * dz) / warp_pitch - 1.0
-                out[CONNECTORS] += (
-                    weight
-                    * warp_pitch
-                    * connector_energy(warp_law[0], warp_law[1], wd, wp, warp_law[2], warp_law[3], warp_law[4], strain)
-                )
-            u = above + i
-            weight = traits[m + at.WEFT_LINE * stride]
-            if weight > 0.0:
-                dx = state[u] - x
-                dy = state[u + stride] - y
-                dz = state[u + 2 * stride] - z
-                strain = math.sqrt(dx * dx + dy * dy + dz * dz) / weft_pitch - 1.0
-                out[CONNECTORS] += (
-                    weight
-                    * weft_pitch
-                    * connector_energy(weft_law[0], weft_law[1], fd, fp, weft_law[2], weft_law[3], weft_law[4], strain)
-                )
+        row = np.uint64(row_index[j]) * length
+        trait = np.uint64(trait_rows[row_index[j]]) * trait_length
+        kinetic_row(state, row, traits, trait, count, stride, density, sums[KINETIC])
+        for k in range(tools):
+            held = (np.uint64(row_index[j]) * np.uint64(tools) + np.uint64(k)) * np.uint64(3) * s
+            contact_energy_row(
+                state, row, traits, trait, tractions, held, count, stride, tool_table[k], poses[k, 0], sums[CONTACT]
+            )  # fmt: skip
+        strain_row(state, row, row + U1, cells, stride, 1.0 / warp_pitch, x)
+        connector_energy_row(
+            traits, trait + s * np.uint64(at.WARP_LINE), cells, warp_pitch, warp_law, wd, wp, x, y, z, sums[CONNECTORS]
+        )  # fmt: skip
         if j == rows - 1:
             continue
-        for i in range(columns - 1):
-            n = base + i
-            m = trait + i
-            volume = traits[m + at.VOLUME * stride]
-            if volume <= 0.0:
-                continue
-            u = above + i
-            low = 0.5
-            left = 0.5
-            if half_cells:
-                low = traits[m + at.LOWER_WEIGHT * stride]
-                left = traits[m + at.LEFT_WEIGHT * stride]
-            whole = 16.0 * low * (1.0 - low) * left * (1.0 - left)
-            g11 = 0.0
-            g22 = 0.0
-            g12 = 0.0
-            hourglass = 0.0
-            q = 0.0
-            if half_cells:
-                q = traits[m + at.MIRROR * stride]
-            for c in range(3):
-                p = c * stride
-                lower = state[n + 1 + p] - state[n + p]
-                upper = state[u + 1 + p] - state[u + p]
-                start = state[u + p] - state[n + p]
-                end = state[u + 1 + p] - state[n + 1 + p]
-                g1 = (low * lower + (1.0 - low) * upper) / warp_pitch
-                g2 = (left * start + (1.0 - left) * end) / weft_pitch
-                if q > 0.0:
-                    # completed by its mirror image (blank.grid.mirrors)
-                    sign = traits[m + at.MIRROR_Z * stride] / q if c == 2 else membrane[6 + c]
-                    g1, g2 = (1.0 - q) * g1 + q * sign * g2, (1.0 - q) * g2 + q * sign * g1
-                g11 += g1 * g1
-                g22 += g2 * g2
-                g12 += g1 * g2
-                hourglass += (upper - lower) ** 2
-            out[HOURGLASS] += 0.5 * membrane[5] * volume * whole * hourglass
-            t = half_tangent(g11, g22, g12)
-            tau = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], t)
-            e1 = log_stretch(g11, series)
-            e2 = log_stretch(g22, series)
-            angle = 2.0 * math.atan(t)
-            field = n + at.LEDGER * stride
-            o1 = state[field]
-            o2 = state[field + stride]
-            oa = state[field + 2 * stride]
-            ot = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], math.tan(0.5 * oa))
+        above = np.uint64(row_index[j + 1]) * length
+        strain_row(state, row, above, count, stride, 1.0 / weft_pitch, x)
+        connector_energy_row(
+            traits, trait + s * np.uint64(at.WEFT_LINE), count, weft_pitch, weft_law, fd, fp, x, y, z, sums[CONNECTORS]
+        )  # fmt: skip
+        lower = trait + s * np.uint64(at.LOWER_WEIGHT) if half_cells else np.uint64(0)
+        left = trait + s * np.uint64(at.LEFT_WEIGHT) if half_cells else np.uint64(0)
+        metric_row(
+            state, row, above, traits, trait, cells, stride, weights, lower, left, half_cells, membrane[6], membrane[7],
+            1.0 / warp_pitch, 1.0 / weft_pitch, membrane[5], g11, g22, g12, sums[HOURGLASS],
+        )  # fmt: skip
+        log_row(g11, cells, series, len(series), x, y, e1)
+        log_row(g22, cells, series, len(series), x, y, e2)
+        field = row + s * np.uint64(at.LEDGER)
+        for i in range(cells):
+            t[i] = half_tangent(g11[i], g22[i], g12[i])
+        for i in range(cells):
+            angle[i] = 2.0 * math.atan(t[i])
+            old = state[field + s + s + i]
+            to[i] = math.tan(0.5 * old)
+            tm[i] = math.tan(0.25 * (angle[i] + old))
+            work[i] = math.exp(state[field + i] + state[field + s + i])
+        shear_row(t, cells, shear_law, sd, sp, x, tau)
+        shear_row(to, cells, shear_law, sd, sp, x, tau_old)
+        shear_row(tm, cells, shear_law, sd, sp, x, tau_mid)
+        volume = trait + s * np.uint64(at.VOLUME)
+        for i in range(cells):
             # Simpson's rule over the way since the last entry, straight in (ln l1, ln l2, gamma)
-            m1 = 0.5 * (e1 + o1)
-            m2 = 0.5 * (e2 + o2)
-            ma = 0.5 * (angle + oa)
-            mt = shear_stress(shear_law[0], sd, sp, shear_law[2], shear_law[3], math.tan(0.5 * ma))
-            new = math.exp(e1 + e2) * math.cos(angle)
-            mid = 4.0 * math.exp(m1 + m2) * math.cos(ma)
-            old = math.exp(o1 + o2) * math.cos(oa)
-            state[field + 3 * stride] += (
-                volume
-                / 6.0
-                * (
-                    membrane[3] * (new * e1 + mid * m1 + old * o1) * (e1 - o1)
-                    + membrane[4] * (new * e2 + mid * m2 + old * o2) * (e2 - o2)
-                    + (new * tau + mid * mt + old * ot) * (angle - oa)
-                )
+            o1, o2, oa = state[field + i], state[field + s + i], state[field + s + s + i]
+            m1 = 0.5 * (e1[i] + o1)
+            m2 = 0.5 * (e2[i] + o2)
+            stretched = g11[i] * g22[i]
+            new = math.sqrt(stretched) * (1.0 - t[i] * t[i]) / (1.0 + t[i] * t[i])
+            mid = 4.0 * math.sqrt(math.sqrt(stretched) * work[i]) * (1.0 - tm[i] * tm[i]) / (1.0 + tm[i] * tm[i])
+            old = work[i] * (1.0 - to[i] * to[i]) / (1.0 + to[i] * to[i])
+            done = (
+                membrane[3] * (new * e1[i] + mid * m1 + old * o1) * (e1[i] - o1)
+                + membrane[4] * (new * e2[i] + mid * m2 + old * o2) * (e2[i] - o2)
+                + (new * tau[i] + mid * tau_mid[i] + old * tau_old[i]) * (angle[i] - oa)
             )
-            state[field] = e1
-            state[field + stride] = e2
-            state[field + 2 * stride] = angle
-            out[MEMBRANE] += state[field + 3 * stride]
+            v = traits[volume + i]
+            state[field + s + s + s + i] += v / 6.0 * done
+            state[field + i] = e1[i]
+            state[field + s + i] = e2[i]
+            state[field + s + s + i] = angle[i]
+        for i in range(cells):
+            sums[MEMBRANE, i] += state[field + s + s + s + i]
+    out = np.zeros(ENTRIES)
+    for k in range(ENTRIES):
+        out[k] = sums[k].sum()
     return out

@@ -30,7 +30,8 @@ class Material:
     warp, weft, shear
         Packed laws: force [N] of a connector by nominal strain, and ``tau / t`` [MPa] by ``t = tan(gamma / 2)``.
     laws
-        Of each: coefficients, integrals, width, slope beyond the end, slope in compression.
+        Of each: coefficients, integrals, width, slope beyond the end, slope in compression, and for a law of one piece the
+        coefficients of its integral over the strain.
     shapes
         Degree and pieces of each.
     membrane
@@ -55,7 +56,7 @@ class Material:
             tuple(arguments[0]) if law.pieces == 1 else arguments[0]
             for arguments, law in zip(self.laws, packed, strict=True)
         )
-        self.ends = np.array([arguments[2:] for arguments in self.laws])
+        self.ends = np.array([arguments[2:5] for arguments in self.laws])
         self.warp_inverse, self.weft_inverse = 1.0 / grid.warp_pitch, 1.0 / grid.weft_pitch
         card = fabric.card.membrane
         stabilise = hourglass * 0.5 * (card.warp_modulus_MPa + card.weft_modulus_MPa)
@@ -95,9 +96,10 @@ def log_series() -> Floats:
     return np.ascontiguousarray(powers[::-1])
 
 
-def _arguments(law: PiecewiseLaw, slack_ratio: float) -> tuple[Floats, Floats, float, float, float]:
+def _arguments(law: PiecewiseLaw, slack_ratio: float) -> tuple[Floats, Floats, float, float, float, Floats]:
     initial = float(law.coefficients[law.degree - 1]) if law.degree else 0.0
-    return law.coefficients, law.integrals, law.width, law.end_slope, slack_ratio * initial
+    integral = law.coefficients[: law.degree + 1] / np.arange(law.degree + 1, 0, -1)
+    return law.coefficients, law.integrals, law.width, law.end_slope, slack_ratio * initial, integral
 
 
 def _mirror_signs(grid: YarnGrid) -> tuple[float, float]:

@@ -121,7 +121,8 @@ class Simulation:
         """The last survey, with what grew since the one before growing on: so fast straining does not outrun the step."""
         return self.last + np.maximum(self.last - self._before, 0.0)
 
-    def _viscosity(self) -> float:
+    @property
+    def viscosity(self) -> float:
         """Share of critical damping of the dashpots, times the area of a cell.
 
         They act on the initial length, so they grow with the square of the stretch; that much they are made weaker.
@@ -193,7 +194,7 @@ class Simulation:
     def _advance(self, steps: int, stop: float) -> int:
         settings = self.problem.settings
         if self._driver is not None:
-            return self._driver.advance(self.clock, steps, stop, self._viscosity())
+            return self._driver.advance(self.clock, steps, stop, self.viscosity)
         if self.bands > 1:
             import numba
 
@@ -209,15 +210,13 @@ class Simulation:
                 machine.times, machine.values, machine.knots, settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
                 self.clock, steps, stop, settings.damping, self.density,
-                self._viscosity(),
+                self.viscosity,
             )
         )  # fmt: skip
 
     def _survey(self) -> Floats:
         layout, sheet, machine, material = self.layout, self.sheet, self.machine, self.material
-        reach = SURVEY_EVERY * self.clock[loop.C_STEP]
-        # what a tool that starts now can push the fabric by is not in the speeds yet
-        margin = CONTACT_MARGIN * self.problem.fabric.thickness + 2.0 * machine.longest_way(self.time, reach)
+        reach, margin = SURVEY_EVERY * self.clock[loop.C_STEP], self.search_margin
         if self._driver is not None:
             return self._driver.survey(reach, SURVEY_EVERY, margin)
         found: Floats = survey.survey(
@@ -227,6 +226,15 @@ class Simulation:
             reach, SURVEY_EVERY, margin,
         )  # fmt: skip
         return found
+
+    @property
+    def search_margin(self) -> float:
+        """Gap below which a crossing counts as touching until the next survey, whatever its speed [mm].
+
+        What a tool that starts now can push the fabric by is not in the speeds yet.
+        """
+        way = self.machine.longest_way(self.time, SURVEY_EVERY * float(self.clock[loop.C_STEP]))
+        return CONTACT_MARGIN * self.problem.fabric.thickness + 2.0 * way
 
     def _enter_ledger(self) -> Floats:
         if self._driver is not None:
