@@ -143,12 +143,17 @@ def test_threads_and_a_gpu_exclude_each_other(tmp_path):
 
 def test_ctrl_c_waits_for_the_end_of_a_batch():
     done = []
-    with pytest.raises(KeyboardInterrupt), uninterrupted():
-        signal.raise_signal(signal.SIGINT)
-        done.append("batch")
-    assert done == ["batch"]
-    with pytest.raises(KeyboardInterrupt):  # the usual answer is back
-        signal.raise_signal(signal.SIGINT)
+    # a shell ignores the signal for what it starts in the background, and this process may have inherited that
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            done.append("batch")
+        assert done == ["batch"]
+        with pytest.raises(KeyboardInterrupt):  # the usual answer is back
+            signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, former)
 
 
 # -- machine code ------------------------------------------------------------------------------------------------------

@@ -20,7 +20,10 @@ RUNS: dict[str, tuple[str, tuple[str, ...]]] = {
     "hemisphere-45": ("hemisphere-45", ()),
     "hemisphere-0-90": ("hemisphere-0-90", ()),
     "hemisphere-full": ("hemisphere-0-90", ("blank.symmetry=full", "output.frames=2")),
-    "hemisphere-fine": ("hemisphere-0-90", ("blank.cell_length_mm=1.92", "output.frames=2")),
+    "hemisphere-fine": (
+        "hemisphere-0-90",
+        ("blank.cell_length_mm=1.92", "solver.least_step_s=1.43e-6", "output.frames=2"),
+    ),
     "hemisphere-slow": ("hemisphere-0-90", ("loading.duration_s=0.3", "output.frames=2")),
     "hemisphere-coarse": ("hemisphere-0-90", ("blank.cell_length_mm=3.77", "output.frames=2")),
     "bias-slow": ("bias-extension", (*SHORT[:1], "loading.duration_s=0.8", *SHORT[2:])),

@@ -364,7 +364,7 @@ def convergence_items(results: Results) -> list[Item]:
     for run, what in (
         ("hemisphere-coarse", "cells 1.4 times larger"),
         ("hemisphere-fine", "cells 1.4 times smaller"),
-        ("hemisphere-slow", "half the speed"),
+        ("hemisphere-slow", "a third of the speed"),
     ):
         found = results[run].summary
         items += [
