@@ -7,10 +7,11 @@ import pytest
 
 from weftform import Result, Study
 from weftform.cases import case_of
-from weftform.execution import COLUMNS, blank_summary
+from weftform.execution import COLUMNS
 from weftform.result.fields import Fields
 from weftform.result.outline import draw_in, formed_outline
 from weftform.result.writer import ResultWriter, claim_folder, write_whole
+from weftform.verdict import blank_summary
 
 STROKE = 30.0
 

@@ -14,7 +14,7 @@ import pytest
 from weftform.cases import case_of
 from weftform.errors import CardError, ResultError, StudyError, UnstableRun
 from weftform.exchange.vtkhdf import Series
-from weftform.execution import COLUMNS, run, threads_for
+from weftform.execution import COLUMNS, run
 from weftform.result import Result
 from weftform.study import Study
 
@@ -345,13 +345,6 @@ def test_nothing_is_written_for_a_bad_card_or_number_of_threads(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["bad.toml"]
 
 
-def test_threads_are_chosen_by_the_size_of_the_blank():
-    assert threads_for(100, None) == 1
-    assert threads_for(100, 1) == 1
-    with pytest.raises(StudyError):
-        threads_for(100, 10**6)
-
-
 def test_no_result_is_refused(tmp_path):
     with pytest.raises(ResultError, match="no such folder"):
         Result.open(tmp_path / "nowhere")
@@ -376,3 +369,20 @@ def test_full_disk_is_one_message_and_leaves_a_checkpoint(tmp_path, monkeypatch,
     assert (tmp_path / "out" / "checkpoint.npz").exists()
     monkeypatch.undo()
     assert run(Study.load("hemisphere-0-90", SMALL), tmp_path / "out", resume=True).summary["status"] == "done"
+
+
+def test_a_last_frame_that_fails_is_not_called_done(tmp_path, monkeypatch):
+    append, frames = Series.append, 3
+
+    def full(self, time, *arguments, **keywords):
+        if time > 0.0 and len(written) == frames - 1:
+            raise OSError(28, "No space left on device")
+        written.append(time)
+        append(self, time, *arguments, **keywords)
+
+    written: list[float] = []
+    monkeypatch.setattr(Series, "append", full)
+    with pytest.raises(ResultError, match="could not be written"):
+        run(Study.load("hemisphere-0-90", SMALL | {"output.frames": frames}), tmp_path / "out")
+    assert len(written) == frames - 1
+    assert not (tmp_path / "out" / "summary.json").exists()

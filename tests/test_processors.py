@@ -4,7 +4,8 @@ import os
 
 import pytest
 
-from weftform.processors import crowding, usable_processors
+from weftform.errors import StudyError
+from weftform.processors import crowding, threads_for, usable_processors
 
 
 @pytest.mark.parametrize(
@@ -30,3 +31,10 @@ def test_time_that_others_took_is_told():
     assert "50 %" in note
     assert crowding(2, 2, processor_s=7.8, wall_s=4.0) == []
     assert crowding(1, 2, processor_s=0.1, wall_s=0.4) == [], "too short to tell"
+
+
+def test_threads_are_chosen_by_the_size_of_the_blank():
+    assert threads_for(100, None) == 1
+    assert threads_for(100, 1) == 1
+    with pytest.raises(StudyError):
+        threads_for(100, 10**6)

@@ -9,29 +9,20 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from weftform.cases import Case, case_of
-from weftform.errors import DeviceError, ResultError, StudyError, UnstableRun
-from weftform.processors import crowding, usable_processors
+from weftform.errors import ResultError, UnstableRun
+from weftform.processors import Device, check_device, crowding, threads_for, usable_processors
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
 from weftform.solver import Ledger, Simulation, survey
 from weftform.study import Study
+from weftform.verdict import beyond_the_laws, blank_summary, doubts, energy_summary
 
-MOST_IMBALANCE = 0.01
-"""Largest share of the work that the ledger may miss."""
-MOST_KINETIC = 0.05
-"""Largest share of kinetic in internal energy once the fabric is loaded."""
-LOADED_FROM = 0.01
-"""The fabric counts as loaded once its internal energy exceeds this share of its largest value."""
-MOST_PENETRATION = 0.05
-"""Largest penetration into a tool as a share of the thickness."""
-CELLS_PER_THREAD = 1500
-"""Cells for which another thread pays."""
 CHECKPOINT_SECONDS = 20.0
 """Wall time between checkpoints of a long run."""
 
@@ -71,53 +62,6 @@ class Progress:
 
 
 Watch = Callable[[Progress], None]
-
-Device = Literal["cpu", "cuda"]
-"""Where the time loop runs: this machine's processors, or a GPU."""
-
-
-def check_device(device: str, threads: int | None = None) -> None:
-    """Make sure that a device can be used, before anything is written.
-
-    Raises
-    ------
-    DeviceError
-        There is no such device, none on this machine, or threads are asked of a GPU.
-    """
-    if device not in get_args(Device):
-        raise DeviceError("no such device", key="--device", expected="cpu or cuda", got=device)
-    if device == "cuda":
-        if threads is not None:
-            raise DeviceError(
-                "threads are of the processor", key="--threads", expected="none with --device cuda", got=str(threads)
-            )
-        from weftform.solver.cuda.gpu import find_gpu
-
-        find_gpu()
-
-
-def threads_for(cells: int, wanted: int | None) -> int:
-    """Threads to use: those asked for, or as many as pay for the size of the blank.
-
-    Raises
-    ------
-    StudyError
-        Less than one, or more than Numba may start.
-    """
-    import numba
-
-    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    if wanted is None:
-        return max(1, min(usable_processors(), most, cells // CELLS_PER_THREAD))
-    if not 1 <= wanted <= most:
-        raise StudyError(
-            "that number of threads cannot be had",
-            key="--threads",
-            expected=f"1 to {most}",
-            got=str(wanted),
-            hint="more threads than processors only wait for each other",
-        )
-    return wanted
 
 
 def run(
@@ -224,8 +168,8 @@ class Run:
                 if time.monotonic() - self._checkpointed > CHECKPOINT_SECONDS:
                     writer.settle()
                     self._checkpoint(float(stop))
+            writer.settle()  # before the summary: it must not say done while a frame can still fail
             self._finish(writer, "done")
-            writer.settle()
             (self.out / "checkpoint.npz").unlink(missing_ok=True)
         except KeyboardInterrupt:
             self._finish(writer, f"interrupted at {self.displacement:.2f} mm")
@@ -352,7 +296,7 @@ class Run:
         study, grid, simulation = self.study, self.grid, self.simulation
         fields = self._last_sound
         energy = energy_summary(self.rows)
-        warnings = self._warnings(energy)
+        warnings = doubts(energy, self.peak_penetration / study.fabric.thickness)
         values: dict[str, Any] = {
             "study": study.name,
             "ok": status == "done" and not warnings,
@@ -380,25 +324,6 @@ class Run:
         if self.rows:
             values.update(self.case.summary(self.rows, fields))
         return values
-
-    def _warnings(self, energy: dict[str, float]) -> list[str]:
-        found = []
-        if energy["balance_error"] > MOST_IMBALANCE:
-            found.append(
-                f"the energy ledger misses {100 * energy['balance_error']:.2g} % of the work (limit 1 %): lower solver.safety"
-            )
-        if energy["kinetic_over_internal"] > MOST_KINETIC:
-            found.append(
-                f"kinetic energy reaches {100 * energy['kinetic_over_internal']:.2g} % of the internal energy (limit 5 %): "
-                "lengthen loading.duration_s"
-            )
-        share = self.peak_penetration / self.study.fabric.thickness
-        if share > MOST_PENETRATION:
-            found.append(
-                f"the fabric sinks {100 * share:.2g} % of its thickness into a tool (limit 5 %): raise "
-                "contact.*.stiffness_N_per_mm3"
-            )
-        return found
 
     # -- checkpoints ------------------------------------------------------------------------------------------------
 
@@ -429,62 +354,6 @@ class Run:
             ) from None
 
 
-def beyond_the_laws(fields: Fields) -> list[str]:
-    """Which laws of the card are used beyond the range for which it gives them, where they go on straight."""
-    notes = []
-    fabric, share = fields.fabric, fields.grid.cell_share
-    here = share > 0.0
-    angle = np.abs(fields.shear_angle[here])
-    beyond = angle > fabric.shear.valid_to * (1.0 + 1e-3)
-    if beyond.any():
-        part = float(share[here][beyond].sum() / share[here].sum())
-        notes.append(
-            f"{100 * part:.3g} % of the area shears beyond {np.degrees(fabric.shear.valid_to):.3g} deg, where the shear law "
-            f"of the card ends (largest {np.degrees(angle.max()):.3g} deg): there it is continued by a straight line"
-        )
-    for name, law, strain in (("warp", fabric.warp, fields.warp_strain), ("weft", fabric.weft, fields.weft_strain)):
-        end = law.specimen_force.valid_to / law.length
-        largest = float(strain[here].max())
-        if largest > end * (1.0 + 1e-3):
-            notes.append(
-                f"the {name} is stretched by {100 * largest:.3g} %, its law in the card ends at {100 * end:.3g} %: beyond, it is "
-                "continued by a straight line"
-            )
-    return notes
-
-
-def energy_summary(rows: list[dict[str, float]]) -> dict[str, float]:
-    """Quality of the energy ledger over a history, and its last entry [mJ]."""
-    if not rows:
-        return {"balance_error": 0.0, "kinetic_over_internal": 0.0}
-    work = max(abs(row["external_work_mJ"]) for row in rows)
-    final = rows[-1]
-    most = max(row["internal_energy_mJ"] for row in rows)
-    loaded = [row for row in rows if row["internal_energy_mJ"] > LOADED_FROM * most > 0.0]
-    return {
-        "balance_error": max(abs(row["imbalance_mJ"]) for row in rows) / work if work > 0.0 else 0.0,
-        "kinetic_over_internal": max(
-            (row["kinetic_energy_mJ"] / row["internal_energy_mJ"] for row in loaded), default=0.0
-        ),
-        **{name: final[name] for name in final if name.endswith("_mJ")},
-    }
-
-
-def blank_summary(study: Study) -> dict[str, float | int | str]:
-    """Size, mesh and area of the blank, and how far the mesh departs from the declared outline."""
-    grid = study.grid
-    return {
-        "warp_cell_length_mm": grid.warp_pitch,
-        "weft_cell_length_mm": grid.weft_pitch,
-        "warp_angle_deg": math.degrees(grid.warp_angle),
-        "symmetry": {1: "full", 2: "half", 4: "quarter"}[grid.copies],
-        "half_cells": int((grid.cells > 1).sum()),
-        "area_mm2": grid.area * grid.copies,
-        "area_error": grid.area / grid.requested_area - 1.0,
-        "mass_kg": 1e3 * study.fabric.areal_density * grid.area * grid.copies,
-    }
-
-
 def _versions() -> str:
     import platform
 
@@ -499,6 +368,3 @@ def _versions() -> str:
         f"numba {numba.__version__}, scipy {scipy.__version__}, h5py {h5py.__version__})\n"
         "every default is written out: `weftform run` on this file repeats the run"
     )
-
-
-__all__ = ["Device", "Progress", "Run", "check_device", "run", "threads_for"]

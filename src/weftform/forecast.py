@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from weftform.cases import case_of
-from weftform.execution import blank_summary, threads_for
 from weftform.fabric.fabric import TensionLaw
 from weftform.mechanics.stable_step import stable_step
+from weftform.processors import threads_for
 from weftform.study import Study
 from weftform.study.schema import FormingModel
+from weftform.verdict import blank_summary
 
 NS_PER_CELL_STEP = 30.0
 """Of one thread with three tools on a laptop of 2023; `weftform doctor` measures this machine."""

@@ -1,13 +1,22 @@
-"""How many processors there are for us, and whether others took them."""
+"""Where a run computes: processors there are for us, whether others took them, or a GPU."""
 
 from __future__ import annotations
 
 import math
 import os
 from pathlib import Path
+from typing import Literal, get_args
+
+from weftform.errors import DeviceError, StudyError
 
 CROWDED = 0.8
 """Share of the processor time asked for below which a run says that others took the rest."""
+
+CELLS_PER_THREAD = 1500
+"""Cells for which another thread pays."""
+
+Device = Literal["cpu", "cuda"]
+"""Where the time loop runs: this machine's processors, or a GPU."""
 
 
 def usable_processors(root: Path = Path("/sys/fs/cgroup")) -> int:
@@ -44,3 +53,47 @@ def crowding(threads: int, usable: int, processor_s: float, wall_s: float) -> li
             f"other programs took {100 * (1 - got):.0f} % of the processor time: the run was slower than this machine is"
         ]
     return []
+
+
+def check_device(device: str, threads: int | None = None) -> None:
+    """Make sure that a device can be used, before anything is written.
+
+    Raises
+    ------
+    DeviceError
+        There is no such device, none on this machine, or threads are asked of a GPU.
+    """
+    if device not in get_args(Device):
+        raise DeviceError("no such device", key="--device", expected="cpu or cuda", got=device)
+    if device == "cuda":
+        if threads is not None:
+            raise DeviceError(
+                "threads are of the processor", key="--threads", expected="none with --device cuda", got=str(threads)
+            )
+        from weftform.solver.cuda.gpu import find_gpu
+
+        find_gpu()
+
+
+def threads_for(cells: int, wanted: int | None) -> int:
+    """Threads to use: those asked for, or as many as pay for the size of the blank.
+
+    Raises
+    ------
+    StudyError
+        Less than one, or more than Numba may start.
+    """
+    import numba
+
+    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    if wanted is None:
+        return max(1, min(usable_processors(), most, cells // CELLS_PER_THREAD))
+    if not 1 <= wanted <= most:
+        raise StudyError(
+            "that number of threads cannot be had",
+            key="--threads",
+            expected=f"1 to {most}",
+            got=str(wanted),
+            hint="more threads than processors only wait for each other",
+        )
+    return wanted

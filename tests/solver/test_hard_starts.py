@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_problems import FABRIC, THICKNESS, all_nodes, ball, driven, free, pressed, whole_grid
+from small_problems import FABRIC, THICKNESS, all_nodes, ball, driven, pressed, whole_grid
 
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.motion import motion_value
@@ -72,8 +72,11 @@ def test_a_long_pull_stays_stable_with_any_dashpot(viscosity):
 
 
 def test_a_light_holder_sets_the_step():
-    free_step = free(whole_grid(12, 10)).step
-    simulation = pressed(whole_grid(12, 10))
-    simulation.machine.tools[1, loop.T_MASS] = 1e-9
+    """Its own stable step is ``2 sqrt(m / k)`` on the contact stiffness (30 N/mm3) of the whole blank."""
+    grid = whole_grid(12, 10)
+    simulation = pressed(grid)
+    before = simulation.step
+    mass = 30.0 * grid.area * (0.1 * before) ** 2
+    simulation.machine.tools[1, loop.T_MASS] = mass
     simulation._choose_step()
-    assert simulation.step < 0.1 * free_step
+    assert simulation.step == pytest.approx(0.85 * 0.2 * before, rel=1e-9)

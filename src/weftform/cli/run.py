@@ -11,7 +11,8 @@ import typer
 from weftform.cli.options import Changes, StudyName
 
 if TYPE_CHECKING:
-    from weftform.execution import Device, Progress, Watch
+    from weftform.execution import Progress, Watch
+    from weftform.processors import Device
 
 
 def run(

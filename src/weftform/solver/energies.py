@@ -21,6 +21,7 @@ from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent, shear_stress
 from weftform.solver import layout as at
+from weftform.solver.measures import metric_row, strain_row
 from weftform.solver.rows import U1
 from weftform.solver.vector_loops import row_loop, use_full_width
 
@@ -77,18 +78,6 @@ def contact_energy_row(state, row, traits, trait, grip, held, count, stride, too
 
 
 @row_loop
-def strain_row(state, row, other, count, stride, inverse, strain):
-    """Nominal strain of the connectors from one row to another place."""
-    use_full_width()
-    s = np.uint64(stride)
-    for i in range(count):
-        dx = state[other + i] - state[row + i]
-        dy = state[other + s + i] - state[row + s + i]
-        dz = state[other + s + s + i] - state[row + s + s + i]
-        strain[i] = math.sqrt(dx * dx + dy * dy + dz * dz) * inverse - 1.0
-
-
-@row_loop
 def connector_energy_row(traits, weight, count, pitch, law, degree, pieces, strain, inside, value, total):
     """Stored energy of connectors; ``law`` = coefficients, integrals, width, slope beyond, slope in compression, and for a
     law of one piece the coefficients of its integral over the strain.
@@ -116,45 +105,23 @@ def connector_energy_row(traits, weight, count, pitch, law, degree, pieces, stra
 
 
 @row_loop
-def metric_row(
-    state, row, above, traits, trait, count, stride, weights, lower, left, half_cells, sign_x, sign_y,
-    warp_inverse, weft_inverse, stabilise, g11, g22, g12, hourglass,
-):  # fmt: skip
-    """Metric of the yarn directions of the cells above a row, and the energy of their hourglass control."""
+def hourglass_row(state, row, above, traits, trait, count, stride, weights, lower, left, stabilise, total):
+    """Energy of the hourglass control of the cells above a row."""
     use_full_width()
     s = np.uint64(stride)
     volume = trait + s * np.uint64(at.VOLUME)
-    mirror = trait + s * np.uint64(at.MIRROR)
-    mirror_z = trait + s * np.uint64(at.MIRROR_Z)
     for i in range(count):
-        wl = weights[lower + i]
-        wa = weights[left + i]
-        a11 = 0.0
-        a22 = 0.0
-        a12 = 0.0
         twist = 0.0
         for c in range(3):
             p = row + i + s * np.uint64(c)
             q = above + i + s * np.uint64(c)
-            low, up = state[p + U1] - state[p], state[q + U1] - state[q]
-            start, end = state[q] - state[p], state[q + U1] - state[p + U1]
-            g1 = (wl * low + (1.0 - wl) * up) * warp_inverse
-            g2 = (wa * start + (1.0 - wa) * end) * weft_inverse
-            if half_cells:
-                # completed by its mirror image (blank.grid.mirrors)
-                share = traits[mirror + i]
-                image = traits[mirror_z + i] if c == 2 else share * (sign_x if c == 0 else sign_y)
-                g1, g2 = (1.0 - share) * g1 + image * g2, (1.0 - share) * g2 + image * g1
-            a11 += g1 * g1
-            a22 += g2 * g2
-            a12 += g1 * g2
-            twist += (up - low) * (up - low)
-        there = traits[volume + i] > 0.0
-        g11[i] = a11 if there else 1.0
-        g22[i] = a22 if there else 1.0
-        g12[i] = a12 if there else 0.0
+            change = (state[q + U1] - state[q]) - (state[p + U1] - state[p])
+            twist += change * change
+        wl = weights[lower + i]
+        wa = weights[left + i]
         whole = 16.0 * (wl * (1.0 - wl)) * (wa * (1.0 - wa))
-        hourglass[i] += 0.5 * stabilise * traits[volume + i] * whole * twist if there else 0.0
+        v = traits[volume + i]
+        total[i] += 0.5 * stabilise * v * whole * twist if v > 0.0 else 0.0
 
 
 @row_loop
@@ -214,7 +181,7 @@ def enter_ledger(
     cells = np.uint64(columns - 1)
     sums = np.zeros((ENTRIES, stride))
     scratch = np.zeros((16, stride))
-    t, to, tm, angle, work = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    t, to, tm, angle, product_old = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     e1, e2, tau, tau_old, tau_mid = scratch[5], scratch[6], scratch[7], scratch[8], scratch[9]
     g11, g22, g12 = scratch[10], scratch[11], scratch[12]
     x, y, z = scratch[13], scratch[14], scratch[15]
@@ -243,9 +210,12 @@ def enter_ledger(
         )  # fmt: skip
         lower = trait + s * np.uint64(at.LOWER_WEIGHT) if half_cells else np.uint64(0)
         left = trait + s * np.uint64(at.LEFT_WEIGHT) if half_cells else np.uint64(0)
+        hourglass_row(
+            state, row, above, traits, trait, cells, stride, weights, lower, left, membrane[5], sums[HOURGLASS]
+        )  # fmt: skip
         metric_row(
             state, row, above, traits, trait, cells, stride, weights, lower, left, half_cells, membrane[6], membrane[7],
-            1.0 / warp_pitch, 1.0 / weft_pitch, membrane[5], g11, g22, g12, sums[HOURGLASS],
+            1.0 / warp_pitch, 1.0 / weft_pitch, g11, g22, g12,
         )  # fmt: skip
         log_row(g11, cells, series, len(series), x, y, e1)
         log_row(g22, cells, series, len(series), x, y, e2)
@@ -257,7 +227,7 @@ def enter_ledger(
             old = state[field + s + s + i]
             to[i] = math.tan(0.5 * old)
             tm[i] = math.tan(0.25 * (angle[i] + old))
-            work[i] = math.exp(state[field + i] + state[field + s + i])
+            product_old[i] = math.exp(state[field + i] + state[field + s + i])
         shear_row(t, cells, shear_law, sd, sp, x, tau)
         shear_row(to, cells, shear_law, sd, sp, x, tau_old)
         shear_row(tm, cells, shear_law, sd, sp, x, tau_mid)
@@ -267,10 +237,10 @@ def enter_ledger(
             o1, o2, oa = state[field + i], state[field + s + i], state[field + s + s + i]
             m1 = 0.5 * (e1[i] + o1)
             m2 = 0.5 * (e2[i] + o2)
-            stretched = g11[i] * g22[i]
-            new = math.sqrt(stretched) * (1.0 - t[i] * t[i]) / (1.0 + t[i] * t[i])
-            mid = 4.0 * math.sqrt(math.sqrt(stretched) * work[i]) * (1.0 - tm[i] * tm[i]) / (1.0 + tm[i] * tm[i])
-            old = work[i] * (1.0 - to[i] * to[i]) / (1.0 + to[i] * to[i])
+            product = math.sqrt(g11[i] * g22[i])  # l1 l2, whose mean over the way is geometric
+            new = product * (1.0 - t[i] * t[i]) / (1.0 + t[i] * t[i])
+            mid = 4.0 * math.sqrt(product * product_old[i]) * (1.0 - tm[i] * tm[i]) / (1.0 + tm[i] * tm[i])
+            old = product_old[i] * (1.0 - to[i] * to[i]) / (1.0 + to[i] * to[i])
             done = (
                 membrane[3] * (new * e1[i] + mid * m1 + old * o1) * (e1[i] - o1)
                 + membrane[4] * (new * e2[i] + mid * m2 + old * o2) * (e2[i] - o2)

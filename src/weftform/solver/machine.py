@@ -20,6 +20,10 @@ class Machine:
         Constants and state of each rigid tool, columns as in :mod:`weftform.solver.loop`.
     times, values, knots
         Motions, shape [motions, knots].
+    legs
+        Of each motion: where its legs begin and end [s], and their peak speeds.
+    springs
+        Stiffness of the contact of each tool with the whole blank [N/mm].
     pieces
         Pieces of rows that each tool can touch (:mod:`weftform.solver.survey`).
     grip
@@ -35,6 +39,7 @@ class Machine:
     def __init__(self, problem: Problem, sheet: Sheet) -> None:
         self.ramp = problem.settings.ramp
         self._place_tools(problem)
+        self.springs = self.tools[:, loop.T_STIFFNESS] * float(problem.grid.node_area.sum())
         tools = len(problem.tools)
         self.pieces = np.zeros((tools, sheet.local_rows, 1 + at.blocks_for(sheet.columns), 3), np.int32)
         self.grip = aligned((sheet.local_rows, tools, 3, sheet.layout.stride))
@@ -71,6 +76,10 @@ class Machine:
             self.times[k, :n] = motion.times
             self.values[k, :n] = motion.values
             self.knots[k] = n
+        self.legs = [
+            (times[:-1], times[1:], np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) / (1.0 - self.ramp))
+            for times, values in ((np.array(motion.times), np.array(motion.values)) for motion in motions)
+        ]
 
     def _drive_crossings(self, problem: Problem, sheet: Sheet) -> None:
         driven = problem.driven
@@ -105,15 +114,13 @@ class Machine:
             motion = int(tool[loop.T_MOTION])
             if motion < 0:
                 continue
-            knots = self.knots[motion]
-            times, values = self.times[motion, :knots], self.values[motion, :knots]
-            if tool[loop.T_MASS] != 0.0:
-                pushed = 0.5 * np.abs(values).max() / tool[loop.T_MASS] * span * span
-                longest = max(longest, float(pushed)) if np.isfinite(pushed) else longest
-                continue
-            ways = np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) / (1.0 - self.ramp)
-            soon = (times[1:] > time) & (times[:-1] < time + span)
-            longest = max(longest, float((ways * soon).max(initial=0.0)) * span)
+            if tool[loop.T_MASS] == 0.0:
+                begin, end, speed = self.legs[motion]
+                soon = (end > time) & (begin < time + span)
+                longest = max(longest, float((speed * soon).max(initial=0.0)) * span)
+            elif tool[loop.T_MASS] > 0.0:  # it has none before the first step is known
+                force = float(np.abs(self.values[motion]).max())
+                longest = max(longest, 0.5 * force / tool[loop.T_MASS] * span * span)
         return longest
 
     def motion(self, index: int, time: float) -> float:

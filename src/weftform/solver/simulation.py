@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from weftform.errors import UnstableRun
-from weftform.mechanics import stable_step as stability
 from weftform.solver import energies, loop, survey
 from weftform.solver import layout as at
 from weftform.solver.layout import Layout, stride_for
 from weftform.solver.machine import Machine
-from weftform.solver.material import Material, largest
+from weftform.solver.material import Material
 from weftform.solver.problem import Ledger, Problem
 from weftform.solver.sheet import Sheet, inertia_area
+from weftform.solver.stepping import choose_holder_mass, fabric_step, holder_step
 
 if TYPE_CHECKING:
     from weftform.solver.cuda.driver import CudaDriver
@@ -31,8 +31,6 @@ LEDGER_EVERY = 8
 """Surveys between entries of the energy ledger."""
 CONTACT_MARGIN = 0.25
 """Share of the thickness within which a crossing always counts as touching."""
-HOLDER_PERIODS = 20.0
-"""Automatic mass of a force-driven tool: one radian of its bounce on the contact takes this many initial steps."""
 
 
 class Simulation:
@@ -84,29 +82,12 @@ class Simulation:
         self._before = self.last
         self._enter_ledger()
         self._choose_step()
-        self._choose_holder_mass()
+        choose_holder_mass(self.machine, self.step)
         self._loop = loop.compile_loop(self.layout, self.bands > 1)
 
     def _choose_step(self) -> None:
-        grid, material, ahead = self.problem.grid, self.material, self._expected
-        # tangents at the largest strains of the whole blank: safe wherever a law stiffens, and never far from the truth
-        warp_force, warp_slope = largest(material.warp, ahead[survey.WARP_STRAIN])
-        weft_force, weft_slope = largest(material.weft, ahead[survey.WEFT_STRAIN])
-        k_warp, k_weft = warp_slope / grid.warp_pitch, weft_slope / grid.weft_pitch
-        t = min(ahead[survey.HALF_TANGENT], 1.0)
-        sine = 2.0 * t / (1.0 + t * t)
-        ratio, ratio_slope = largest(material.shear, t)
-        modulus = 0.5 * (ratio + t * ratio_slope) * (1.0 + t * t) + t * ratio
-        aspect = grid.cell_area / min(grid.warp_pitch, grid.weft_pitch) ** 2
-        cell = self.problem.fabric.thickness * aspect * (modulus / max(1.0 - sine, 1e-3) + sum(material.moduli))
-        # a yarn under tension resists sideways with its force over its length
-        taut = max(warp_force, 0.0) / grid.warp_pitch + max(weft_force, 0.0) / grid.weft_pitch
-        crossing = stability.crossing_stiffness(k_warp, k_weft, cell + taut, sine)
-        contact = sum(t.stiffness for t in self.problem.tools) * grid.cell_area
         settings = self.problem.settings
-        step = settings.safety * stability.stable_step(
-            crossing, contact, self.density * grid.cell_area, settings.viscosity
-        )
+        step = settings.safety * fabric_step(self.problem, self.material, self.density, self._expected)
         scale = max(1.0, (settings.least_step / step) ** 2)
         if scale != self.clock[loop.C_INERTIA]:
             # heavier at the same speed: the energy that this adds is booked as work
@@ -114,7 +95,7 @@ class Simulation:
             self._inertia_work += 0.5 * self.density * added * float(self.last[survey.KINETIC])
             self.clock[loop.C_INERTIA] = scale
             self.largest_inertia = max(self.largest_inertia, scale)
-        self.clock[loop.C_STEP] = min(step * math.sqrt(scale), self._holder_step())
+        self.clock[loop.C_STEP] = min(step * math.sqrt(scale), settings.safety * holder_step(self.machine))
 
     @property
     def _expected(self) -> Floats:
@@ -129,27 +110,6 @@ class Simulation:
         """
         stretch = 1.0 + max(self._expected[survey.WARP_STRAIN], self._expected[survey.WEFT_STRAIN], 0.0)
         return float(self.problem.settings.viscosity * self.problem.grid.cell_area / stretch**2)
-
-    def _holder_step(self) -> float:
-        """Stable step of the tools that are pushed, on the whole blank as their spring [s]."""
-        area = float(self.problem.grid.node_area.sum())
-        steps = [
-            self.problem.settings.safety * 2.0 * math.sqrt(row[loop.T_MASS] / (row[loop.T_STIFFNESS] * area))
-            for row in self.machine.tools
-            if row[loop.T_MASS] > 0.0
-        ]
-        return min(steps, default=math.inf)
-
-    def _choose_holder_mass(self) -> None:
-        area = float(self.problem.grid.node_area.sum())
-        for row in self.machine.tools:
-            if row[loop.T_MASS] == 0.0:
-                continue
-            spring = row[loop.T_STIFFNESS] * area
-            if np.isnan(row[loop.T_MASS]):
-                row[loop.T_MASS] = spring * (HOLDER_PERIODS * self.clock[loop.C_STEP]) ** 2
-            # half of critical damping of the bounce on the contact
-            row[loop.T_DAMPING] = math.sqrt(spring / row[loop.T_MASS])
 
     # -- running ---------------------------------------------------------------------------------------------------
 
@@ -209,8 +169,7 @@ class Simulation:
                 machine.tools, machine.poses, machine.pieces, machine.grip.reshape(-1), machine.reactions, machine.heats,
                 machine.times, machine.values, machine.knots, settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
-                self.clock, steps, stop, settings.damping, self.density,
-                self.viscosity,
+                self.clock, steps, stop, settings.damping, self.density, self.viscosity,
             )
         )  # fmt: skip
 
@@ -222,8 +181,8 @@ class Simulation:
         found: Floats = survey.survey(
             sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index, sheet.spans,
             layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools,
-            material.warp_inverse, material.weft_inverse, machine.tools, machine.poses, machine.pieces,
-            reach, SURVEY_EVERY, margin,
+            material.warp_inverse, material.weft_inverse, material.membrane[6], material.membrane[7], machine.tools, machine.poses,
+            machine.pieces, reach, SURVEY_EVERY, margin,
         )  # fmt: skip
         return found
 

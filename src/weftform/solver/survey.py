@@ -12,6 +12,7 @@ from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent
 from weftform.mechanics.piecewise import piecewise_slope, piecewise_value
 from weftform.solver import layout as at
+from weftform.solver.measures import metric_row, strain_row
 from weftform.solver.rows import U1
 from weftform.solver.vector_loops import row_loop, use_full_width
 
@@ -61,46 +62,21 @@ def speed_row(state, row, traits, trait, count, stride, fastest, broken, kinetic
 
 
 @row_loop
-def connector_row(state, row, other, traits, weight, count, stride, inverse, longest, shortest):
-    """Largest and smallest squared stretch so far in each column, of the connectors from ``row`` to ``other``."""
+def extremes_row(traits, weight, count, strain, longest, shortest):
+    """Largest and smallest strain so far in each column, of the connectors that there are."""
     use_full_width()
-    s = np.uint64(stride)
     for i in range(count):
-        dx = state[other + i] - state[row + i]
-        dy = state[other + s + i] - state[row + s + i]
-        dz = state[other + s + s + i] - state[row + s + s + i]
-        squared = (dx * dx + dy * dy + dz * dz) * (inverse * inverse)
         there = traits[weight + i] > 0.0
-        longest[i] = max(longest[i], squared if there else 0.0)
-        shortest[i] = min(shortest[i], squared if there else math.inf)
+        longest[i] = max(longest[i], strain[i] if there else -1.0)
+        shortest[i] = min(shortest[i], strain[i] if there else math.inf)
 
 
 @row_loop
-def shear_row(
-    state, row, above, traits, trait, count, stride, weights, lower, left, warp_inverse, weft_inverse, sheared
-):
-    """Largest ``|tan(gamma / 2)|`` so far in each column, of the cells between a row and the next."""
+def tangent_row(count, g11, g22, g12, sheared):
+    """Largest ``|tan(gamma / 2)|`` so far in each column."""
     use_full_width()
-    s = np.uint64(stride)
-    volume = trait + s * np.uint64(at.VOLUME)
     for i in range(count):
-        wl = weights[lower + i]
-        wa = weights[left + i]
-        g11 = 0.0
-        g22 = 0.0
-        g12 = 0.0
-        for c in range(3):
-            p = row + i + s * np.uint64(c)
-            q = above + i + s * np.uint64(c)
-            g1 = wl * (state[p + U1] - state[p]) + (1.0 - wl) * (state[q + U1] - state[q])
-            g2 = wa * (state[q] - state[p]) + (1.0 - wa) * (state[q + U1] - state[p + U1])
-            g11 += g1 * g1
-            g22 += g2 * g2
-            g12 += g1 * g2
-        t = half_tangent(
-            g11 * warp_inverse * warp_inverse, g22 * weft_inverse * weft_inverse, g12 * warp_inverse * weft_inverse
-        )
-        sheared[i] = max(sheared[i], abs(t) if traits[volume + i] > 0.0 else 0.0)
+        sheared[i] = max(sheared[i], abs(half_tangent(g11[i], g22[i], g12[i])))
 
 
 @row_loop
@@ -122,7 +98,7 @@ def gap_row(state, row, traits, trait, count, stride, tool, tool_z, gap, inward)
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def survey(
     state, traits, trait_rows, row_index, spans, stride, fields, trait_fields, half_cells, tools, warp_inverse, weft_inverse,
-    tool_table, poses, pieces, reach, ahead, margin,
+    sign_x, sign_y, tool_table, poses, pieces, reach, ahead, margin,
 ):  # fmt: skip
     """Survey the state.
 
@@ -132,6 +108,8 @@ def survey(
         Local row of each row of the grid, shape [rows].
     spans
         Of each local row (:func:`weftform.solver.spans.row_spans`).
+    sign_x, sign_y
+        Of the mirror image that completes a half cell (:func:`weftform.blank.grid.mirrors`).
     pieces
         Output, shape [tools, local rows, 1 + most pieces, 3]: in the first entry how many pieces of the row a tool can
         touch until the next survey; then where each begins, its length, and :data:`TOUCHING` or :data:`ON_FACE`.
@@ -152,10 +130,11 @@ def survey(
     fastest = np.zeros(stride)
     broken = np.zeros(stride)
     kinetic = np.zeros(stride)
-    longest_warp = np.zeros(stride)
-    longest_weft = np.zeros(stride)
+    longest_warp = np.full(stride, -1.0)
+    longest_weft = np.full(stride, -1.0)
     shortest = np.full(stride, np.inf)
     sheared = np.zeros(stride)
+    strain, g11, g22, g12 = np.empty(stride), np.empty(stride), np.empty(stride), np.empty(stride)
     halves = np.full(stride, 0.5)
     weights = traits if half_cells else halves
     for j in range(rows):
@@ -168,33 +147,30 @@ def survey(
         speed_row(
             state, row, traits, trait, count, stride, fastest[begin:], broken[begin:], kinetic[begin:]
         )  # fmt: skip
+        strain_row(state, row, row + U1, count, stride, warp_inverse, strain)
         weight = trait + np.uint64(at.WARP_LINE * stride)
-        connector_row(
-            state, row, row + U1, traits, weight, count, stride, warp_inverse, longest_warp[begin:], shortest[begin:]
-        )  # fmt: skip
+        extremes_row(traits, weight, count, strain, longest_warp[begin:], shortest[begin:])
         if j == rows - 1:
             continue
+        strain_row(state, row, above, count, stride, weft_inverse, strain)
         weight = trait + np.uint64(at.WEFT_LINE * stride)
-        connector_row(
-            state, row, above, traits, weight, count, stride, weft_inverse, longest_weft[begin:], shortest[begin:]
-        )  # fmt: skip
+        extremes_row(traits, weight, count, strain, longest_weft[begin:], shortest[begin:])
         lower = trait + np.uint64(at.LOWER_WEIGHT * stride) if half_cells else np.uint64(0)
         left = trait + np.uint64(at.LEFT_WEIGHT * stride) if half_cells else np.uint64(0)
-        shear_row(
-            state, row, above, traits, trait, count, stride, weights, lower, left, warp_inverse, weft_inverse,
-            sheared[begin:],
+        metric_row(
+            state, row, above, traits, trait, count, stride, weights, lower, left, half_cells, sign_x, sign_y,
+            warp_inverse, weft_inverse, g11, g22, g12,
         )  # fmt: skip
-    longest = max(longest_warp.max(), longest_weft.max())
+        tangent_row(count, g11, g22, g12, sheared[begin:])
     out[FASTEST] = math.sqrt(fastest.max())
-    out[WARP_STRAIN] = math.sqrt(longest_warp.max()) - 1.0
-    out[WEFT_STRAIN] = math.sqrt(longest_weft.max()) - 1.0
-    out[SLACKEST] = math.sqrt(shortest.min()) - 1.0 if shortest.min() < math.inf else 0.0
+    out[WARP_STRAIN] = longest_warp.max()
+    out[WEFT_STRAIN] = longest_weft.max()
+    out[SLACKEST] = shortest.min() if shortest.min() < math.inf else 0.0
     out[HALF_TANGENT] = sheared.max()
     out[KINETIC] = kinetic.sum()
     out[FINITE] = 1.0
-    if not (
-        broken.sum() == 0.0 and out[FASTEST] < LARGEST_SPEED and longest < (1.0 + LARGEST_STRAIN) ** 2
-    ):  # also where a NaN is
+    longest = max(out[WARP_STRAIN], out[WEFT_STRAIN])
+    if not (broken.sum() == 0.0 and out[FASTEST] < LARGEST_SPEED and longest < LARGEST_STRAIN):  # also where a NaN is
         out[FINITE] = 0.0
         out[WORST_ROW], out[WORST_COLUMN] = worst_crossing(
             state, traits, trait_rows, row_index, spans, stride, fields, trait_fields, warp_inverse, weft_inverse
@@ -209,18 +185,8 @@ def survey(
             begin = spans[r, 0]
             count = spans[r, 1]
             trait = np.uint64(trait_rows[r] * trait_fields * stride + begin)
-            gap_row(
-                state,
-                np.uint64(r * length + begin),
-                traits,
-                trait,
-                np.uint64(count),
-                stride,
-                tool_table[k],
-                poses[k, 0],
-                gap,
-                inward,
-            )
+            row = np.uint64(r * length + begin)
+            gap_row(state, row, traits, trait, np.uint64(count), stride, tool_table[k], poses[k, 0], gap, inward)
             found = 0
             former = CLEAR
             for block in range(0, count, at.LANES):
