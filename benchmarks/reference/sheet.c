@@ -23,7 +23,7 @@
 
 enum { CLEAR, TOUCHING, ON_FACE };
 enum { SIDE_S, S0, SIDE_Z, Z0, RADIUS, HALF, STIFFNESS, FRICTION, RATIO, MOTION, MASS, RATE, TOOL_COLUMNS };
-enum { AT, SPEED, REACTION, LAST_AT, LAST_REACTION, LAST_DRIVE, WORK, DAMPED, POSE_COLUMNS };
+enum { AT, SPEED, REACTION, LAST_AT, LAST_DRIVE, WORK, DAMPED, POSE_COLUMNS };
 enum { FASTEST, WARP_SQUARED, WEFT_SQUARED, LEAST_SQUARED, TANGENT, PENETRATION, FINITE, MOVING, SURVEYED };
 
 typedef struct {
@@ -333,7 +333,6 @@ static void move_tools(Sheet *q, const double *reactions, double mean_step)
     for (int k = 0; k < TOOLS; k++) {
         double *t = q->tools + k * TOOL_COLUMNS, *p = q->poses + k * POSE_COLUMNS;
         double z = p[AT], travelled = z - p[LAST_AT], drive = reactions[k], ahead = z;
-        p[LAST_REACTION] = p[REACTION];
         p[REACTION] = reactions[k];
         if (t[MASS] > 0.0) {
             drive = motion(q, (int64_t)t[MOTION], q->time);

@@ -88,16 +88,10 @@ def _versions() -> Finding:
 
 
 def _threads() -> Finding:
-    import numba
+    from weftform.processors import usable_processors
 
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    return Finding(
-        "threads",
-        f"{available} processors for this process, Numba may start {most}",
-        most <= available,
-        "more threads than processors: unset NUMBA_NUM_THREADS",
-    )
+    usable, there = usable_processors(), os.cpu_count() or 1
+    return Finding("threads", f"{usable} of {there} processors may be used", True)
 
 
 def _gpu() -> Finding:

@@ -356,15 +356,15 @@ class Run:
 
 def _versions() -> str:
     import platform
+    from importlib.metadata import version  # knows it without importing
 
     import h5py
     import numba
-    import scipy
 
     from weftform import __version__
 
     return (
         f"{RESOLVED} {__version__} (Python {platform.python_version()}, numpy {np.__version__}, "
-        f"numba {numba.__version__}, scipy {scipy.__version__}, h5py {h5py.__version__})\n"
+        f"numba {numba.__version__}, scipy {version('scipy')}, h5py {h5py.__version__})\n"
         "every default is written out: `weftform run` on this file repeats the run"
     )

@@ -12,8 +12,10 @@ from weftform.errors import DeviceError, StudyError
 CROWDED = 0.8
 """Share of the processor time asked for below which a run says that others took the rest."""
 
-CELLS_PER_THREAD = 1500
-"""Cells for which another thread pays."""
+CELLS_PER_THREAD = 350
+"""Cells for which another thread pays: it makes a step of them in twice the time that two threads wait for each other."""
+CROWD = 4
+"""Threads per processor beyond which a wish for threads must be a mistake."""
 
 Device = Literal["cpu", "cuda"]
 """Where the time loop runs: this machine's processors, or a GPU."""
@@ -81,13 +83,12 @@ def threads_for(cells: int, wanted: int | None) -> int:
     Raises
     ------
     StudyError
-        Less than one, or more than Numba may start.
+        Less than one, or many more than there are processors.
     """
-    import numba
-
-    most = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    usable = usable_processors()
     if wanted is None:
-        return max(1, min(usable_processors(), most, cells // CELLS_PER_THREAD))
+        return max(1, min(usable, cells // CELLS_PER_THREAD))
+    most = CROWD * max(2, usable)
     if not 1 <= wanted <= most:
         raise StudyError(
             "that number of threads cannot be had",

@@ -252,6 +252,23 @@ class YarnGrid:
         return share, signs
 
     @cached_property
+    def cut_cells(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the half cells on planes of symmetry."""
+        rows, columns = np.nonzero(self.mirrors[0])
+        return rows, columns
+
+    @cached_property
+    def corners_known(self) -> NDArray[np.bool_]:
+        """Corners of cells at which two connectors meet, or one and the mirror image of another: shape [4, rows - 1,
+        columns - 1] in the order of :data:`CORNERS`.
+        """
+        cut = self.mirrors[0] > 0.0
+        warp, weft = self.warp_lines > 0.0, self.weft_lines > 0.0
+        lower, upper, left, right = (present | cut for present in (warp[:-1], warp[1:], weft[:, :-1], weft[:, 1:]))
+        exists = self.cells != Cell.ABSENT
+        return np.asarray(np.stack([lower & left, lower & right, upper & right, upper & left]) & exists)
+
+    @cached_property
     def quads(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
         """Cells as polygons: flat node indices, offsets of each polygon, and (j, i) of each, shape [cells, 2]."""
         columns = self.shape[1]

@@ -1,9 +1,10 @@
 """The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
 
 Order within a sweep, for each row: contact, then its warp connectors with the cells and weft connectors above, then
-the update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows; a band holds copies of its
-neighbours' edge rows (halos), refreshed before each step, so no thread reads what another writes, and every row is
-computed by the same operations in the same order whatever the number of bands.
+the update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows and stay in the loop;
+a band holds copies of its neighbours' edge rows (halos), refreshed before each step while all wait for each other
+(:mod:`weftform.solver.team`), so no thread reads what another writes, and every row is computed by the same operations in
+the same order whatever the number of bands.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from weftform.solver.layout import Layout
 from weftform.solver.rows import carry_row, fabric_row, update_row, warp_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
 from weftform.solver.survey import ON_FACE
+from weftform.solver.team import meet, next_order
 
 # columns of the table of rigid tools
 T_SHAPE = 0
@@ -40,10 +42,9 @@ P_Z = 0
 P_VELOCITY = 1
 P_REACTION = 2
 P_LAST_Z = 3
-P_LAST_REACTION = 4
-P_LAST_DRIVE = 5
-P_WORK = 6
-P_DAMPED = 7
+P_LAST_DRIVE = 4
+P_WORK = 5
+P_DAMPED = 6
 POSE_COLUMNS = 8
 
 # the clock: what changes from step to step
@@ -56,6 +57,13 @@ C_INERTIA = 5
 """Factor on all masses of the fabric (variable mass scaling)."""
 CLOCK_COLUMNS = 6
 
+# a batch of steps: at most how many, up to which time, and the dashpots on the way
+B_STEPS = 0
+B_STOP = 1
+B_VISCOSITY = 2
+"""Share of critical damping times the area of a cell [mm2] (:attr:`weftform.solver.Simulation.viscosity`)."""
+BATCH_COLUMNS = 3
+
 IDENTITY, COSINE, SINE = 0, 1, 2
 """How a motion enters a direction of driven crossings: a, cos a - 1 or sin a."""
 
@@ -67,6 +75,42 @@ def _mode_amplitude(kind, value):
     if kind == SINE:
         return np.sin(value)
     return value
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _drive_crossings(
+    state, nodes, driven_state, held, modes, mode_motion, mode_kind, motion_times, motion_values, motion_knots, ramp,
+    time, share, amplitude, stride,
+):  # fmt: skip
+    """Give the driven crossings the velocity that takes them to where they belong at ``time``."""
+    for m in range(mode_motion.shape[0]):
+        k = mode_motion[m]
+        value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time)
+        amplitude[m] = _mode_amplitude(mode_kind[m], value)
+    for n in range(nodes.shape[0]):
+        for c in range(3):
+            if not held[n, c]:
+                continue
+            target = driven_state[n, c]
+            for m in range(mode_motion.shape[0]):
+                target += amplitude[m] * modes[m, n, c]
+            place = nodes[n] + c * stride
+            state[place + at.VELOCITY * stride] = (target - state[place]) * share
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _drive_work(state, nodes, driven_state, held, stride, force_field, step):
+    """Work on the driven crossings: half of this step's way with this force, half with the next one's (trapezium)."""
+    work = 0.0
+    for n in range(nodes.shape[0]):
+        place = nodes[n]
+        for c in range(3):
+            if not held[n, c]:
+                continue
+            now = state[place + (at.VELOCITY + c) * stride] * step
+            work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
+            driven_state[n, 3 + c] = now
+    return work
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
@@ -85,7 +129,6 @@ def _sweep_band(
     kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of
     damping and of friction with each tool.
     """
-    flush_subnormals()
     for k in range(block):
         edge[block + k] = 0.0
         node[block + k] = 0.0
@@ -143,8 +186,43 @@ def _sweep_band(
             carry_row(np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride)
 
 
+@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+def _move_tools(
+    tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramp, time, step, mean_step
+):  # fmt: skip
+    """Place the tools for the next step: where their motion has them, or where force, reaction and inertia take them."""
+    for k in range(tool_table.shape[0]):
+        total = 0.0
+        for r in range(reactions.shape[1]):
+            total += reactions[k, r]
+        motion = int(tool_table[k, T_MOTION])
+        z = poses[k, P_Z]
+        travelled = z - poses[k, P_LAST_Z]
+        mass = tool_table[k, T_MASS]
+        poses[k, P_REACTION] = total
+        drive = total
+        if mass > 0.0:
+            drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time)
+            rate = tool_table[k, T_DAMPING]
+            old = poses[k, P_VELOCITY]
+            new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
+                1.0 + 0.5 * rate * mean_step
+            )
+            poses[k, P_DAMPED] += 0.25 * rate * mass * (old + new) * (old + new) * mean_step
+            poses[k, P_VELOCITY] = new
+            ahead = z + step * new
+        elif motion >= 0:
+            ahead = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time + step)
+        else:
+            ahead = z
+        poses[k, P_WORK] += 0.5 * (drive + poses[k, P_LAST_DRIVE]) * travelled
+        poses[k, P_LAST_DRIVE] = drive
+        poses[k, P_LAST_Z] = z
+        poses[k, P_Z] = ahead
+
+
 @cache
-def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
+def compile_loop(layout: Layout) -> Callable[..., Any]:
     """The compiled time loop for a layout; kernels are cached on disk per user (see
     :mod:`weftform.solver.kernel_cache`).
     """
@@ -156,8 +234,6 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
     driven = layout.driven
     trait_length = layout.traits * layout.stride
     force_field = layout.force
-    # In the loop this is a constant, so that the disk cache tells the two apart: its key does not hold ``parallel``.
-    threaded = int(parallel)
     warp_degree, warp_pieces = layout.warp_degree, layout.warp_pieces
     weft_degree, weft_pieces = layout.weft_degree, layout.weft_pieces
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
@@ -166,47 +242,48 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
         state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
         warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
         tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramp,
-        driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, steps, stop, alpha,
-        density, viscous,
+        driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, batch, alpha, density,
+        gate, band, order,
     ):  # fmt: skip
-        """Make at most ``steps`` steps, up to the time ``stop``; returns the number made."""
+        """March a band through batches of steps, as long as there are orders after ``order`` (:mod:`weftform.solver.team`).
+
+        Each band of the team calls it at the same time. What belongs to the whole sheet, its tools and its clock, is
+        written by band 0 alone. Returns the number of steps of its last batch.
+        """
         environment = flush_subnormals()
         bands = bounds.shape[0]
-        assert threaded or bands == 1
-        rows = pieces.shape[1]
-        done = 0
+        first, last = bounds[band, 0], bounds[band, 1]
         amplitude = np.zeros(mode_motion.shape[0])
-        step = clock[C_STEP]
-        last_step = clock[C_LAST_STEP]
-        inertia = clock[C_INERTIA]
-        while done < steps and clock[C_TIME] < stop:
-            time = clock[C_TIME]
-            mean_step = 0.5 * (step + last_step)
-            keep = (1.0 - 0.5 * alpha * mean_step) / (1.0 + 0.5 * alpha * mean_step)
-            kick = mean_step / ((1.0 + 0.5 * alpha * mean_step) * inertia)
-            if driven:
-                for m in range(mode_motion.shape[0]):
-                    k = mode_motion[m]
-                    value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time + step)
-                    amplitude[m] = _mode_amplitude(mode_kind[m], value)
-                share = 1.0 / (step * keep)
-                for n in range(driven_nodes.shape[0]):
-                    for c in range(3):
-                        if not driven_held[n, c]:
-                            continue
-                        target = driven_state[n, c]
-                        for m in range(mode_motion.shape[0]):
-                            target += amplitude[m] * driven_modes[m, n, c]
-                        place = driven_nodes[n] + c * stride
-                        state[place + at.VELOCITY * stride] = (target - state[place]) * share
-            for h in range(halo_to.shape[0]):
-                source = halo_from[h] * row_length
-                target_row = halo_to[h] * row_length
-                for k in range(6 * stride):
-                    state[target_row + k] = state[source + k]
-            for band in numba.prange(bands):
+        done = 0
+        while True:
+            order = next_order(gate, band, order)
+            if order == 0:
+                break
+            steps, stop, viscous = batch[B_STEPS], batch[B_STOP], batch[B_VISCOSITY]
+            time, step, last_step, inertia = clock[C_TIME], clock[C_STEP], clock[C_LAST_STEP], clock[C_INERTIA]
+            done = 0
+            if not meet(gate, bands):
+                break
+            while done < steps and time < stop:
+                mean_step = 0.5 * (step + last_step)
+                keep = (1.0 - 0.5 * alpha * mean_step) / (1.0 + 0.5 * alpha * mean_step)
+                kick = mean_step / ((1.0 + 0.5 * alpha * mean_step) * inertia)
+                if driven:
+                    if band == 0:
+                        _drive_crossings(
+                            state, driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, motion_times,
+                            motion_values, motion_knots, ramp, time + step, 1.0 / (step * keep), amplitude, stride,
+                        )  # fmt: skip
+                    meet(gate, bands)
+                for h in range(halo_to.shape[0]):
+                    if first <= halo_to[h] <= last:
+                        source = halo_from[h] * row_length
+                        target = halo_to[h] * row_length
+                        for k in range(6 * stride):
+                            state[target + k] = state[source + k]
+                meet(gate, bands)
                 _sweep_band(
-                    state, traits, trait_rows, band, bands, bounds[band, 0], bounds[band, 1], spans, edge[band],
+                    state, traits, trait_rows, band, bands, first, last, spans, edge[band],
                     node[band], membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
                     tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep,
                     0.25 * alpha * density * inertia * mean_step,
@@ -214,55 +291,23 @@ def compile_loop(layout: Layout, parallel: bool) -> Callable[..., Any]:
                     stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
                     warp_degree, warp_pieces, weft_degree, weft_pieces, shear_degree, shear_pieces,
                 )  # fmt: skip
-            for k in range(tools):
-                total = 0.0
-                for r in range(rows):
-                    total += reactions[k, r]
-                motion = int(tool_table[k, T_MOTION])
-                z = poses[k, P_Z]
-                travelled = z - poses[k, P_LAST_Z]
-                mass = tool_table[k, T_MASS]
-                poses[k, P_LAST_REACTION] = poses[k, P_REACTION]
-                poses[k, P_REACTION] = total
-                drive = total
-                if mass > 0.0:
-                    drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time)
-                    rate = tool_table[k, T_DAMPING]
-                    old = poses[k, P_VELOCITY]
-                    new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
-                        1.0 + 0.5 * rate * mean_step
-                    )
-                    poses[k, P_DAMPED] += 0.25 * rate * mass * (old + new) * (old + new) * mean_step
-                    poses[k, P_VELOCITY] = new
-                    ahead = z + step * new
-                elif motion >= 0:
-                    ahead = motion_value(
-                        motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time + step
-                    )
-                else:
-                    ahead = z
-                poses[k, P_WORK] += 0.5 * (drive + poses[k, P_LAST_DRIVE]) * travelled
-                poses[k, P_LAST_DRIVE] = drive
-                poses[k, P_LAST_Z] = z
-                poses[k, P_Z] = ahead
-            if driven:
-                # trapezium of the force over the way: half of this step's way with this force, half with the next one's
-                work = 0.0
-                for n in range(driven_nodes.shape[0]):
-                    place = driven_nodes[n]
-                    for c in range(3):
-                        if not driven_held[n, c]:
-                            continue
-                        now = state[place + (at.VELOCITY + c) * stride] * step
-                        work -= state[place + (force_field + c) * stride] * 0.5 * (now + driven_state[n, 3 + c])
-                        driven_state[n, 3 + c] = now
-                clock[C_DRIVE_WORK] += work
-            clock[C_TIME] = time + step
-            last_step = step
-            done += 1
-        clock[C_LAST_STEP] = last_step
-        clock[C_STEPS_DONE] += done
+                meet(gate, bands)
+                if band == 0:
+                    _move_tools(
+                        tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramp, time, step, mean_step
+                    )  # fmt: skip
+                    if driven:
+                        clock[C_DRIVE_WORK] += _drive_work(
+                            state, driven_nodes, driven_state, driven_held, stride, force_field, step
+                        )
+                time += step
+                last_step = step
+                done += 1
+            if band == 0:
+                clock[C_TIME] = time
+                clock[C_LAST_STEP] = last_step
+                clock[C_STEPS_DONE] += done
         restore_subnormals(environment)
         return done
 
-    return numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=parallel, cache=True, nogil=True)(advance)
+    return numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)(advance)

@@ -17,6 +17,10 @@ OUT_OF_THE_WAY = 1.0e5
 """Height of crossings that are not part of the blank [mm]."""
 CACHE_LINE = 64
 """Bytes; arrays begin on a multiple, so that the widest vectors never straddle two."""
+ROW_COST = 8
+"""Crossings whose work is that of beginning and ending a row."""
+LEAST_ROWS = 2
+"""Of a band, so that no two of its neighbours share one."""
 
 
 def aligned(shape: tuple[int, ...]) -> Floats:
@@ -66,18 +70,20 @@ class Sheet:
     def __init__(self, grid: YarnGrid, layout: Layout, bands: int, volume: float, density: float) -> None:
         self.grid, self.layout, self.bands = grid, layout, bands
         self.rows, self.columns = grid.shape
-        self._lay_out_bands()
+        spans = row_spans(grid.active)
+        cost = spans[:, 5] + ROW_COST
+        cost[-1] = ROW_COST  # there are no cells above it
+        self._lay_out_bands(even_edges(cost, bands))
         self.state = aligned((self.local_rows, layout.fields, layout.stride))
         self._place_crossings()
         self._traits = self._describe(volume, density)
         self._share_traits()
-        self.spans: Ints = self._spread(row_spans(grid.active))
+        self.spans: Ints = self._spread(spans)
         self.edge = aligned((bands, layout.edge_scratch))
         self.node = aligned((bands, layout.node_scratch))
 
-    def _lay_out_bands(self) -> None:
+    def _lay_out_bands(self, edges: Ints) -> None:
         bands = self.bands
-        edges = np.linspace(0, self.rows, bands + 1).round().astype(int)
         self.row_index = np.zeros(self.rows, np.int64)
         self.bounds = np.zeros((bands, 2), np.int64)
         local = 0
@@ -192,6 +198,31 @@ class Sheet:
     def vectors(self, first: int) -> Floats:
         """Three fields of the state, shape [rows, columns, 3]."""
         return np.stack([self.state[self.row_index, first + c, : self.columns] for c in range(3)], axis=-1)
+
+
+def even_edges(cost: Ints, bands: int) -> Ints:
+    """Where bands of rows begin and end so that each has the same work, as nearly as whole rows allow.
+
+    Parameters
+    ----------
+    cost
+        Of each row, shape [rows].
+    bands
+        At most half as many as rows.
+
+    Returns
+    -------
+    shape [bands + 1]. Each band but the first also has the work of the row before it, whose cells its own first row needs.
+    """
+    until = np.concatenate([[0], np.cumsum(cost)])
+    again = np.maximum(np.arange(bands + 1) - 1, 0) * cost.max()
+    wanted = np.arange(bands + 1) / bands * (until[-1] + again[-1]) - again
+    edges = np.searchsorted(until, wanted - 0.5 * cost.max())
+    inner = np.arange(bands + 1) * LEAST_ROWS
+    edges = np.maximum.accumulate(np.maximum(edges - inner, 0)) + inner
+    shared: Ints = np.minimum(edges, len(cost) - inner[::-1]).astype(np.int64)
+    shared[-1] = len(cost)
+    return shared
 
 
 def inertia_area(grid: YarnGrid) -> Floats:

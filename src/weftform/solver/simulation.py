@@ -19,6 +19,7 @@ from weftform.solver.material import Material
 from weftform.solver.problem import Ledger, Problem
 from weftform.solver.sheet import Sheet, inertia_area
 from weftform.solver.stepping import choose_holder_mass, fabric_step, holder_step
+from weftform.solver.team import Team
 
 if TYPE_CHECKING:
     from weftform.solver.cuda.driver import CudaDriver
@@ -83,7 +84,9 @@ class Simulation:
         self._enter_ledger()
         self._choose_step()
         choose_holder_mass(self.machine, self.step)
-        self._loop = loop.compile_loop(self.layout, self.bands > 1)
+        self._loop = loop.compile_loop(self.layout)
+        self._team = Team(self.bands)
+        self._batch = np.zeros(loop.BATCH_COLUMNS)
 
     def _choose_step(self) -> None:
         settings = self.problem.settings
@@ -152,14 +155,12 @@ class Simulation:
                 break
 
     def _advance(self, steps: int, stop: float) -> int:
-        settings = self.problem.settings
         if self._driver is not None:
             return self._driver.advance(self.clock, steps, stop, self.viscosity)
-        if self.bands > 1:
-            import numba
+        self._batch[:] = steps, stop, self.viscosity
+        return self._team.work(self._march)
 
-            # more bands than processors wait for each other; the result is the same
-            numba.set_num_threads(min(self.bands, int(vars(numba.config)["NUMBA_NUM_THREADS"])))
+    def _march(self, band: int, order: int) -> int:
         sheet, machine, material = self.sheet, self.machine, self.material
         return int(
             self._loop(
@@ -167,9 +168,9 @@ class Simulation:
                 sheet.halo_from, sheet.spans, sheet.edge, sheet.node, tuple(material.membrane), tuple(material.series),
                 *material.loop_laws, material.ends, material.warp_inverse, material.weft_inverse,
                 machine.tools, machine.poses, machine.pieces, machine.grip.reshape(-1), machine.reactions, machine.heats,
-                machine.times, machine.values, machine.knots, settings.ramp,
+                machine.times, machine.values, machine.knots, self.problem.settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
-                self.clock, steps, stop, settings.damping, self.density, self.viscosity,
+                self.clock, self._batch, self.problem.settings.damping, self.density, self._team.gate, band, order,
             )
         )  # fmt: skip
 
@@ -224,9 +225,7 @@ class Simulation:
         if self._driver is not None:
             self._driver.compile()
             return
-        clock = self.clock.copy()
         self._advance(0, 0.0)
-        self.clock[:] = clock
 
     def checkpoint(self) -> dict[str, Floats]:
         """Everything that :meth:`restore` needs to go on."""

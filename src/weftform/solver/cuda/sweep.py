@@ -42,7 +42,6 @@ from weftform.solver.layout import Layout
 from weftform.solver.loop import (
     P_DAMPED,
     P_LAST_DRIVE,
-    P_LAST_REACTION,
     P_LAST_Z,
     P_REACTION,
     P_VELOCITY,
@@ -61,7 +60,6 @@ def move_tool(tools, poses, k, total, planned, step, mean_step):
     z = poses[k, P_Z]
     travelled = z - poses[k, P_LAST_Z]
     mass = tools[k, T_MASS]
-    poses[k, P_LAST_REACTION] = poses[k, P_REACTION]
     poses[k, P_REACTION] = total
     drive = total
     ahead = z

@@ -1,0 +1,148 @@
+"""Threads that take orders, wait for each other, go to sleep and are called off."""
+
+import threading
+import time
+
+import numba
+import numpy as np
+import pytest
+from small_problems import pressed, whole_grid
+
+from weftform.solver import team
+from weftform.solver.sheet import LEAST_ROWS, even_edges
+from weftform.solver.team import ARRIVED, CALLED_OFF, ORDERS, Team, meet, next_order
+
+
+@numba.njit(nogil=True)
+def take_turns(gate, members, member, order, turns, tally, worst):
+    """Every turn each member writes its own entry, and after all have met reads those of all."""
+    done = 0
+    while True:
+        order = next_order(gate, member, order)
+        if order == 0:
+            return done
+        if not meet(gate, members):
+            return -1
+        for _ in range(turns):
+            tally[member] += 1
+            meet(gate, members)
+            for k in range(members):
+                worst[member] = max(worst[member], abs(tally[k] - tally[member]))
+            meet(gate, members)
+        done = turns
+
+
+class Game:
+    def __init__(self, members, turns=200):
+        self.team = Team(members)
+        self.tally, self.worst = np.zeros(members, np.int64), np.zeros(members, np.int64)
+        self.turns = turns
+        self.calls = []
+
+    def play(self, band, order):
+        self.calls.append((band, order))
+        return take_turns(self.team.gate, self.team.members, band, order, self.turns, self.tally, self.worst)
+
+    def round(self):
+        return self.team.work(self.play)
+
+
+@pytest.mark.parametrize("members", [1, 2, 3, 5])
+def test_nobody_goes_on_before_all_are_there(members):
+    """Also with more members than processors."""
+    game = Game(members)
+    for k in range(1, 6):
+        assert game.round() == game.turns
+        assert game.tally[0] == k * game.turns
+    assert (game.tally == 5 * game.turns).all()
+    assert (game.worst == 0).all()
+
+
+def test_members_stay_for_the_next_order():
+    """What a thread does beside its bands: it is called once for many orders."""
+    game = Game(2, turns=10)
+    for _ in range(50):
+        game.round()
+    assert sum(band == 0 for band, _ in game.calls) == 50
+    assert sum(band == 1 for band, _ in game.calls) < 50
+
+
+def test_members_that_went_to_sleep_are_called_again():
+    game = Game(2, turns=3)
+    for _ in range(5):
+        game.round()
+        gone = time.monotonic() + 10.0
+        while not game.team.gate[ORDERS + team.APART] & 1:
+            assert time.monotonic() < gone
+            time.sleep(0.001)
+    assert (game.tally == 15).all()
+    assert [order for band, order in game.calls if band == 1] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("members", [2, 3])
+def test_an_interrupt_before_the_work_leaves_it_undone(members):
+    """The others already wait at the first meeting: they leave, and the next order finds all of them again."""
+    game = Game(members)
+    game.round()
+
+    def interrupted(band, order):
+        if band == 0:
+            while game.team.gate[ARRIVED] < members - 1:
+                time.sleep(0.001)
+            raise KeyboardInterrupt
+        return game.play(band, order)
+
+    time.sleep(0.1)
+    with pytest.raises(KeyboardInterrupt):
+        game.team.work(interrupted)
+    assert game.team.gate[CALLED_OFF]
+    assert (game.tally == game.turns).all()
+    game.round()
+    assert (game.tally == 2 * game.turns).all() and (game.worst == 0).all()
+
+
+def test_an_error_in_the_work_reaches_the_caller():
+    def broken(band, order):
+        raise ValueError(f"band {band}")
+
+    group = Team(2)
+    with pytest.raises(ValueError, match="band 0"):
+        group.work(broken)
+
+
+def test_threads_end_with_their_simulation():
+    simulation = pressed(whole_grid(12, 16), threads=3)
+    simulation.advance_to(1e-5)
+    mine = [thread for thread in threading.enumerate() if thread.name.startswith("weftform-band")]
+    assert len(mine) >= 2
+    del simulation
+    for thread in mine:
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+# -- shares ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bands", [1, 2, 3, 7])
+def test_bands_of_equal_rows_differ_by_a_row_at_most(bands):
+    """The first has no row before it to do again, so it gets one more."""
+    sizes = np.diff(even_edges(np.full(70, 40), bands))
+    assert sizes.sum() == 70
+    work = sizes + (np.arange(bands) > 0)
+    assert work.max() - work.min() <= 1
+
+
+@pytest.mark.parametrize("bands", [2, 3, 6])
+def test_no_band_is_too_narrow_however_uneven_the_rows(bands):
+    for cost in (np.geomspace(1, 1e6, 24), np.geomspace(1e6, 1, 24), np.eye(24)[12] * 1000 + 1):
+        edges = even_edges(cost.astype(np.int64), bands)
+        assert edges[0] == 0 and edges[-1] == 24
+        assert (np.diff(edges) >= LEAST_ROWS).all()
+
+
+def test_a_round_blank_is_shared_by_its_cells():
+    """Rows of a quarter disc get shorter: half of the area lies below 0.40 of the radius."""
+    y = (np.arange(400) + 0.5) / 400
+    cost = (1000 * np.sqrt(1.0 - y**2)).astype(np.int64)
+    assert even_edges(cost, 2)[1] / 400 == pytest.approx(0.404, abs=0.004)
