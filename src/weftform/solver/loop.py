@@ -25,6 +25,7 @@ from weftform.solver.rows import carry_row, fabric_row, update_row, warp_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
 from weftform.solver.survey import ON_FACE
 from weftform.solver.team import meet, next_order
+from weftform.solver.vector_loops import loop_part
 
 # columns of the table of rigid tools
 T_SHAPE = 0
@@ -45,7 +46,7 @@ P_LAST_Z = 3
 P_LAST_DRIVE = 4
 P_WORK = 5
 P_DAMPED = 6
-POSE_COLUMNS = 8
+POSE_COLUMNS = 7
 
 # the clock: what changes from step to step
 C_TIME = 0
@@ -68,7 +69,7 @@ IDENTITY, COSINE, SINE = 0, 1, 2
 """How a motion enters a direction of driven crossings: a, cos a - 1 or sin a."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+@loop_part
 def _mode_amplitude(kind, value):
     if kind == COSINE:
         return np.cos(value) - 1.0
@@ -77,7 +78,7 @@ def _mode_amplitude(kind, value):
     return value
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+@loop_part
 def _drive_crossings(
     state, nodes, driven_state, held, modes, mode_motion, mode_kind, motion_times, motion_values, motion_knots, ramp,
     time, share, amplitude, stride,
@@ -98,7 +99,7 @@ def _drive_crossings(
             state[place + at.VELOCITY * stride] = (target - state[place]) * share
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+@loop_part
 def _drive_work(state, nodes, driven_state, held, stride, force_field, step):
     """Work on the driven crossings: half of this step's way with this force, half with the next one's (trapezium)."""
     work = 0.0
@@ -113,7 +114,7 @@ def _drive_work(state, nodes, driven_state, held, stride, force_field, step):
     return work
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+@loop_part
 def _sweep_band(
     state, traits, trait_rows, band, bands, first, last, spans, edge, node, membrane, series,
     warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
@@ -186,7 +187,7 @@ def _sweep_band(
             carry_row(np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True)
+@loop_part
 def _move_tools(
     tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramp, time, step, mean_step
 ):  # fmt: skip
@@ -253,6 +254,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
         environment = flush_subnormals()
         bands = bounds.shape[0]
         first, last = bounds[band, 0], bounds[band, 1]
+        own_edge, own_node = edge[band], node[band]
         amplitude = np.zeros(mode_motion.shape[0])
         done = 0
         while True:
@@ -283,8 +285,8 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
                             state[target + k] = state[source + k]
                 meet(gate, bands)
                 _sweep_band(
-                    state, traits, trait_rows, band, bands, first, last, spans, edge[band],
-                    node[band], membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
+                    state, traits, trait_rows, band, bands, first, last, spans, own_edge,
+                    own_node, membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
                     tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep,
                     0.25 * alpha * density * inertia * mean_step,
                     viscous * density * inertia / step,

@@ -198,17 +198,18 @@ class Simulation:
 
     def _enter_ledger(self) -> Floats:
         if self._driver is not None:
-            return self._driver.enter_ledger()
+            self._entry = self._driver.enter_ledger()
+            return self._entry
         layout, sheet, machine, material = self.layout, self.sheet, self.machine, self.material
         grid = self.problem.grid
         warp, weft, shear = material.laws
-        entry: Floats = energies.enter_ledger(
-            sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index, self.columns,
+        self._entry = energies.enter_ledger(
+            sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index,
             layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools, self.density,
             material.membrane, material.series, warp, weft, shear, material.shapes,
             grid.warp_pitch, grid.weft_pitch, machine.tools, machine.poses, machine.grip,
         )  # fmt: skip
-        return entry
+        return self._entry
 
     def _report_blow_up(self) -> None:
         row, column = int(self.last[survey.WORST_ROW]), int(self.last[survey.WORST_COLUMN])
@@ -362,6 +363,12 @@ class Simulation:
     def penetration(self) -> float:
         """Largest penetration at the last survey [mm]."""
         return float(self.last[survey.PENETRATION])
+
+    @property
+    def largest_shear(self) -> float:
+        """Largest angle by which two connectors that meet had closed or opened at the last :meth:`ledger` [rad]."""
+        closed = min(float(self._entry[energies.CLOSED]), 1.0)
+        return math.atan2(math.sqrt(closed), math.sqrt(1.0 - closed))
 
     def ledger(self) -> Ledger:
         """Energies now [mJ]."""

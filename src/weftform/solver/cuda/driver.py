@@ -298,7 +298,9 @@ class CudaDriver:
             *_on_device(self.machine.tools, self.machine.poses), *self._integrals, result,
         )  # fmt: skip
         self._ahead.add("kept")
-        entry: Floats = result.copy_to_host().sum(axis=0)
+        rows = result.copy_to_host()
+        entry: Floats = rows.sum(axis=0)
+        entry[energies.CLOSED] = rows[:, energies.CLOSED].max()
         entry[energies.KINETIC] *= self._density
         return entry
 

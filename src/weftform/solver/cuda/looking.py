@@ -14,13 +14,14 @@ import numba
 import numpy as np
 from numba import cuda
 
+from weftform.mechanics.angles import angle_between, cosine, mean_half_tangent
 from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent, log_stretch, shear_stress
 from weftform.solver import energies, survey
 from weftform.solver import layout as at
 from weftform.solver.cuda.elements import covariant_vectors
-from weftform.solver.cuda.functions import device_function, dot, minus, put_vector, vector_at
+from weftform.solver.cuda.functions import combine, device_function, dot, minus, put_vector, vector_at
 from weftform.solver.cuda.launch import MOVING, Constants, kept_fields
 from weftform.solver.layout import Layout
 
@@ -38,6 +39,8 @@ R_WORST = 6
 R_TOOLS = 7
 """Per tool: minus the smallest gap, minus the smallest distance to the edge of its face."""
 
+ONE = np.uint64(1)
+
 
 @device_function
 def squared_stretch(moving, m, step, stride, inverse_length):
@@ -54,6 +57,31 @@ def line_energy(moving, m, step, stride, weight, inverse_length, law, integrals)
 
 
 @device_function
+def edges_of_cell(moving, m, stride, up):
+    """Lower, upper, left and right edge of the cell above and to the right of a crossing."""
+    a = vector_at(moving, m, stride)
+    b = vector_at(moving, m + ONE, stride)
+    c = vector_at(moving, m + up, stride)
+    d = vector_at(moving, m + up + ONE, stride)
+    return minus(b, a), minus(d, c), minus(c, a), minus(d, b)
+
+
+@device_function
+def squared_sine(a, b):
+    """Squared sine of what two connectors at a corner miss of a right angle."""
+    product = dot(a, b)
+    return product * product / max(dot(a, a) * dot(b, b), 1e-300)
+
+
+@device_function
+def chosen(first, condition, second):
+    """One of two vectors."""
+    if condition:
+        return first
+    return second
+
+
+@device_function
 def simpson(old, middle, new):
     """Six times the mean of a function over an interval."""
     return old + 4.0 * middle + new
@@ -66,21 +94,47 @@ def keep_largest(array, place, value):
 
 
 @cache
+def compile_cell_vectors(layout: Layout, constants: Constants) -> Any:
+    """Function: mean yarn vectors of a cell from its edges (:func:`weftform.solver.cuda.elements.covariant_vectors`)."""
+    lower_weight, left_weight, mirror_field, mirror_z_field = (
+        np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
+    )
+    half_cells, membrane = bool(layout.half_cells), constants.membrane
+    i1, i2 = membrane[0], membrane[1]
+
+    @device_function
+    def cell_vectors(traits, t, lower, upper, left, right):
+        low = 0.5
+        near = 0.5
+        q = 0.0
+        mirror_z = 0.0
+        if half_cells:
+            low = traits[t + lower_weight]
+            near = traits[t + left_weight]
+            q = traits[t + mirror_field]
+            mirror_z = traits[t + mirror_z_field]
+        return covariant_vectors(
+            lower, upper, left, right, low, near, q, q * membrane[5], q * membrane[6], mirror_z, i1, i2
+        )
+
+    return cell_vectors
+
+
+@cache
 def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
     """Kernel: what each row finds, into an array of shape [rows, R_TOOLS + 2 tools]."""
     stride = np.uint64(layout.stride)
     columns = constants.columns
     moving_row, traits_row = MOVING * layout.stride, layout.traits * layout.stride
     up = np.uint64(moving_row)
-    one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
-    area_field, inertia_field, warp_line, weft_line, volume_field, lower_weight, left_weight = (
-        np.uint64(field * layout.stride)
-        for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME, at.LOWER_WEIGHT, at.LEFT_WEIGHT)
+    area_field, inertia_field, warp_line, weft_line, volume_field = (
+        np.uint64(field * layout.stride) for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME)
     )
-    half_cells, tools = bool(layout.half_cells), layout.tools
+    tools = layout.tools
     entries = R_TOOLS + 2 * tools
     i1, i2 = constants.membrane[0], constants.membrane[1]
+    cell_vectors = compile_cell_vectors(layout, constants)
     fastest_allowed = survey.LARGEST_SPEED**2
     longest_allowed = (1.0 + survey.LARGEST_STRAIN) ** 2
 
@@ -105,7 +159,7 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
             keep_largest(shared, (R_TOOLS + 2 * k + 1) * threads + thread, table[k, 0] * (away - table[k, 1]))
         bad = False
         if traits[t + warp_line] > 0.0:
-            squared = squared_stretch(moving, m, one, stride, i1)
+            squared = squared_stretch(moving, m, ONE, stride, i1)
             keep_largest(shared, R_WARP * threads + thread, squared)
             keep_largest(shared, R_SHORTEST * threads + thread, -squared)
             bad = squared > longest_allowed
@@ -118,19 +172,9 @@ def compile_survey(layout: Layout, constants: Constants, threads: int) -> Any:
 
     @device_function
     def look_at_cell(moving, traits, shared, thread, m, t):
-        """Shear of a cell; of a half cell on a plane of symmetry what is modelled, as weftform.solver.survey does."""
-        low = 0.5
-        near = 0.5
-        if half_cells:
-            low = traits[t + lower_weight]
-            near = traits[t + left_weight]
-        a = vector_at(moving, m, stride)
-        b = vector_at(moving, m + one, stride)
-        c = vector_at(moving, m + up, stride)
-        d = vector_at(moving, m + up + one, stride)
-        g1, g2 = covariant_vectors(
-            minus(b, a), minus(d, c), minus(c, a), minus(d, b), low, near, 0.0, 0.0, 0.0, 0.0, i1, i2
-        )
+        """Shear of a cell."""
+        lower, upper, left, right = edges_of_cell(moving, m, stride, up)
+        g1, g2 = cell_vectors(traits, t, lower, upper, left, right)
         sheared = abs(tangent(dot(g1, g1), dot(g2, g2), dot(g1, g2)))
         keep_largest(shared, R_HALF_TANGENT * threads + thread, sheared)
 
@@ -178,7 +222,6 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         fields * layout.stride for fields in (MOVING, kept_fields(layout), layout.traits, 3)
     )
     up = np.uint64(moving_row)
-    one = np.uint64(1)
     velocity = np.uint64(at.VELOCITY * layout.stride)
     area_field, inertia_field, warp_line, weft_line, volume_field = (
         np.uint64(field * layout.stride) for field in (at.AREA, at.INERTIA, at.WARP_LINE, at.WEFT_LINE, at.VOLUME)
@@ -189,15 +232,21 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     memory = np.uint64((at.LEDGER - MOVING) * layout.stride)
     half_cells, tools = bool(layout.half_cells), layout.tools
     entries = energies.ENTRIES
-    kinetic, connectors, membrane_work, hourglass, contact = (
+    kinetic, connectors, membrane_work, hourglass, contact, closed = (
         entry * threads
-        for entry in (energies.KINETIC, energies.CONNECTORS, energies.MEMBRANE, energies.HOURGLASS, energies.CONTACT)
-    )
+        for entry in (
+            energies.KINETIC, energies.CONNECTORS, energies.MEMBRANE, energies.HOURGLASS, energies.CONTACT, energies.CLOSED
+        )
+    )  # fmt: skip
     warp_law, weft_law, law = constants.warp_law, constants.weft_law, constants.shear_law
     series, membrane = constants.series, constants.membrane
     i1, i2 = membrane[0], membrane[1]
     rounded, tangent = device_function(rounded_edge), device_function(half_tangent)
     stress, log_of = device_function(shear_stress), device_function(log_stretch)
+    half_way, change_of, cos_of = (
+        device_function(mean_half_tangent), device_function(angle_between), device_function(cosine)
+    )  # fmt: skip
+    cell_vectors = compile_cell_vectors(layout, constants)
 
     @device_function
     def add_crossing(moving, traits, grip, table, poses, shared, thread, m, t, row, i):
@@ -219,55 +268,68 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
 
     @device_function
     def add_cell(moving, kept, traits, shared, thread, m, n, t):
-        """Hourglass energy of a cell, and its membrane work since the last entry by Simpson's rule, straight in
-        (ln l1, ln l2, gamma)."""
+        """Hourglass energy of a cell, and its membrane work since the last entry, as weftform.solver.energies has them."""
         volume = traits[t + volume_field]
-        low = 0.5
-        near = 0.5
-        q = 0.0
-        mirror_z = 0.0
+        lower, upper, left, right = edges_of_cell(moving, m, stride, up)
+        whole = 1.0
         if half_cells:
             low = traits[t + lower_weight]
             near = traits[t + left_weight]
-            q = traits[t + mirror_field]
-            mirror_z = traits[t + mirror_z_field]
-        a = vector_at(moving, m, stride)
-        b = vector_at(moving, m + one, stride)
-        c = vector_at(moving, m + up, stride)
-        d = vector_at(moving, m + up + one, stride)
-        lower = minus(b, a)
-        upper = minus(d, c)
+            whole = 16.0 * low * (1.0 - low) * near * (1.0 - near)
         twist = minus(upper, lower)
-        whole = 16.0 * low * (1.0 - low) * near * (1.0 - near)
         shared[hourglass + thread] += 0.5 * membrane[4] * volume * whole * dot(twist, twist)
-        g1, g2 = covariant_vectors(
-            lower, upper, minus(c, a), minus(d, b), low, near, q, q * membrane[5], q * membrane[6], mirror_z, i1, i2
-        )
+        g1, g2 = cell_vectors(traits, t, lower, upper, left, right)
         g11 = dot(g1, g1)
         g22 = dot(g2, g2)
-        tan_half = tangent(g11, g22, dot(g1, g2))
-        e1 = log_of(g11, series)
-        e2 = log_of(g22, series)
-        angle = 2.0 * math.atan(tan_half)
+        now = tangent(g11, g22, dot(g1, g2))
         field = n + memory
-        o1, o2, oa = vector_at(kept, field, stride)
+        h1, h2, before = vector_at(kept, field, stride)
+        h11, h22 = 1.0 + h1, 1.0 + h2
+        middle = half_way(now, before)
+        e1, e2, o1, o2 = log_of(g11, series), log_of(g22, series), log_of(h11, series), log_of(h22, series)
         m1 = 0.5 * (e1 + o1)
         m2 = 0.5 * (e2 + o2)
-        ma = 0.5 * (angle + oa)
-        old = math.exp(o1 + o2) * math.cos(oa)
-        mid = math.exp(m1 + m2) * math.cos(ma)
-        new = math.exp(e1 + e2) * math.cos(angle)
-        old_tau = stress(law[0], law[1], law[2], law[3], law[4], math.tan(0.5 * oa))
-        mid_tau = stress(law[0], law[1], law[2], law[3], law[4], math.tan(0.5 * ma))
-        tau = stress(law[0], law[1], law[2], law[3], law[4], tan_half)
+        stretched, stretched_before = math.sqrt(g11 * g22), math.sqrt(h11 * h22)
+        old = stretched_before * cos_of(before)
+        mid = math.sqrt(stretched * stretched_before) * cos_of(middle)
+        new = stretched * cos_of(now)
+        old_tau = stress(law[0], law[1], law[2], law[3], law[4], before)
+        mid_tau = stress(law[0], law[1], law[2], law[3], law[4], middle)
+        tau = stress(law[0], law[1], law[2], law[3], law[4], now)
         work = kept[field + stride + stride + stride] + volume / 6.0 * (
             membrane[2] * simpson(old * o1, mid * m1, new * e1) * (e1 - o1)
             + membrane[3] * simpson(old * o2, mid * m2, new * e2) * (e2 - o2)
-            + simpson(old * old_tau, mid * mid_tau, new * tau) * (angle - oa)
+            + simpson(old * old_tau, mid * mid_tau, new * tau) * change_of(now, before)
         )
-        put_vector(kept, field, stride, (e1, e2, angle))
+        put_vector(kept, field, stride, (g11 - 1.0, g22 - 1.0, now))
         kept[field + stride + stride + stride] = work
         shared[membrane_work + thread] += work
+
+    @device_function
+    def add_corners(moving, traits, shared, thread, m, t, above):
+        """Angles at the corners of a cell at which two connectors are, as :func:`weftform.solver.measures.closed_row`."""
+        lower, upper, left, right = edges_of_cell(moving, m, stride, up)
+        has_lower, has_upper = traits[t + warp_line] > 0.0, traits[above + warp_line] > 0.0
+        has_left, has_right = traits[t + weft_line] > 0.0, traits[t + weft_line + ONE] > 0.0
+        if half_cells and traits[t + mirror_field] > 0.0:
+            low, near = traits[t + lower_weight], traits[t + left_weight]
+            # a share is a half
+            x, y = 2.0 * traits[t + mirror_field] * membrane[5], 2.0 * traits[t + mirror_field] * membrane[6]
+            z = 2.0 * traits[t + mirror_z_field]
+            warp, weft = combine(low, lower, 1.0 - low, upper), combine(near, left, 1.0 - near, right)
+            of_warp = (x * warp[0], y * warp[1], z * warp[2])
+            of_weft = (x * weft[0], y * weft[1], z * weft[2])
+            lower, upper = chosen(of_weft, low == 0.0, lower), chosen(of_weft, low == 1.0, upper)
+            left, right = chosen(of_warp, near == 0.0, left), chosen(of_warp, near == 1.0, right)
+            has_lower = has_upper = has_left = has_right = True
+        if has_lower and has_left:
+            keep_largest(shared, closed + thread, squared_sine(lower, left))
+        if has_lower and has_right:
+            keep_largest(shared, closed + thread, squared_sine(lower, right))
+        if has_upper and has_right:
+            keep_largest(shared, closed + thread, squared_sine(upper, right))
+        if has_upper and has_left:
+            keep_largest(shared, closed + thread, squared_sine(upper, left))
 
     def enter(moving, kept, traits, trait_rows, grip, table, poses, warp_integrals, weft_integrals, found):
         shared = cuda.shared.array(0, numba.float64)
@@ -283,19 +345,23 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
                 add_crossing(moving, traits, grip, table, poses, shared, thread, m, t, row, i)
             warp = traits[t + warp_line]
             if warp > 0.0:
-                shared[connectors + thread] += line_energy(moving, m, one, stride, warp, i1, warp_law, warp_integrals)
+                shared[connectors + thread] += line_energy(moving, m, ONE, stride, warp, i1, warp_law, warp_integrals)
             weft = traits[t + weft_line]
             if weft > 0.0:
                 shared[connectors + thread] += line_energy(moving, m, up, stride, weft, i2, weft_law, weft_integrals)
             if traits[t + volume_field] > 0.0:
                 add_cell(moving, kept, traits, shared, thread, m, n, t)
+                add_corners(
+                    moving, traits, shared, thread, m, t, np.uint64(trait_rows[row + 1] * traits_row + i)
+                )  # fmt: skip
         width = threads
         cuda.syncthreads()
         while width > 1:
             half = (width + 1) // 2
             if thread < width - half:
-                for entry in range(entries):
+                for entry in range(energies.CLOSED):
                     shared[entry * threads + thread] += shared[entry * threads + thread + half]
+                keep_largest(shared, closed + thread, shared[closed + thread + half])
             cuda.syncthreads()
             width = half
         if thread == 0:
