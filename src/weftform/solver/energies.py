@@ -18,12 +18,13 @@ import math
 import numba
 import numpy as np
 
-from weftform.mechanics.angles import angle_between, cosine, mean_half_tangent
+from weftform.mechanics.angles import angle_between, mean_half_tangent, root_of_secants
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent, shear_stress
-from weftform.mechanics.piecewise import horner
+from weftform.mechanics.piecewise import horner, polynomial
+from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
 from weftform.solver.measures import closed_row, metric_row, strain_row
 from weftform.solver.rows import U1
@@ -129,28 +130,15 @@ def hourglass_row(state, row, above, traits, trait, count, stride, weights, lowe
 
 
 @row_loop
-def log_row(g, count, series, terms, y, y2, out):
-    """``ln l`` from ``l^2`` (mechanics.membrane.log_stretch)."""
-    use_full_width()
-    for i in range(count):
-        y[i] = (g[i] - 1.0) / (g[i] + 1.0)
-        y2[i] = y[i] * y[i]
-    polynomial_row(series, terms - 1, y2, out, count)
-    for i in range(count):
-        out[i] *= y[i]
-
-
-@row_loop
-def tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, h11, h22):
-    """``tan(gamma / 2)`` now, at the last entry and halfway between, and the squared stretches of the last entry."""
+def tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, root):
+    """``tan(gamma / 2)`` now, at the last entry and halfway between, and what the difference of the two needs besides."""
     use_full_width()
     s = np.uint64(stride)
     for i in range(count):
         t[i] = half_tangent(g11[i], g22[i], g12[i])
         before[i] = state[field + s + s + i]
-        middle[i] = mean_half_tangent(t[i], before[i])
-        h11[i] = 1.0 + state[field + i]
-        h22[i] = 1.0 + state[field + s + i]
+        root[i] = root_of_secants(t[i], before[i])
+        middle[i] = mean_half_tangent(t[i], before[i], root[i])
 
 
 @row_loop
@@ -171,27 +159,45 @@ def shear_row(t, count, law, degree, pieces, inside, out):
 
 @row_loop
 def work_row(
-    state, field, traits, volume, count, stride, warp_modulus, weft_modulus,
-    g11, g22, t, e1, e2, tau, h11, h22, before, o1, o2, tau_before, middle, tau_middle, total,
+    state, field, traits, volume, count, stride, warp_modulus, weft_modulus, series,
+    g11, g22, t, tau, before, tau_before, middle, tau_middle, root, total,
 ):  # fmt: skip
-    """Work of the membrane since the last entry, by Simpson's rule straight in (ln l1, ln l2, gamma); becomes the last."""
+    """Work of the membrane since the last entry, by Simpson's rule straight in (ln l1, ln l2, gamma); becomes the last.
+
+    One reciprocal serves four logarithms, another three cosines ``(1 - t^2) / (1 + t^2)``; roots by multiplications,
+    because the divider is what these loops wait for.
+    """
     use_full_width()
     s = np.uint64(stride)
     for i in range(count):
-        stretched, stretched_before = math.sqrt(g11[i] * g22[i]), math.sqrt(h11[i] * h22[i])
-        new = stretched * cosine(t[i])
-        old = stretched_before * cosine(before[i])
-        mid = 4.0 * math.sqrt(stretched * stretched_before) * cosine(middle[i])
-        m1 = 0.5 * (e1[i] + o1[i])
-        m2 = 0.5 * (e2[i] + o2[i])
+        g1, g2 = g11[i], g22[i]
+        h1, h2 = 1.0 + state[field + i], 1.0 + state[field + s + i]
+        # ln l from l^2 (mechanics.membrane.log_stretch)
+        both, both_before = (g1 + 1.0) * (g2 + 1.0), (h1 + 1.0) * (h2 + 1.0)
+        inverse = 1.0 / (both * both_before)
+        new, old = inverse * both_before, inverse * both
+        y1, y2 = (g1 - 1.0) * (g2 + 1.0) * new, (g2 - 1.0) * (g1 + 1.0) * new
+        z1, z2 = (h1 - 1.0) * (h2 + 1.0) * old, (h2 - 1.0) * (h1 + 1.0) * old
+        e1, e2 = y1 * polynomial(series, y1 * y1), y2 * polynomial(series, y2 * y2)
+        o1, o2 = z1 * polynomial(series, z1 * z1), z2 * polynomial(series, z2 * z2)
+        # area ratios l1 l2 cos(gamma)
+        stretched, stretched_before = g1 * g2, h1 * h2
+        stretched *= inverse_root(stretched)
+        stretched_before *= inverse_root(stretched_before)
+        product = stretched * stretched_before
+        a, b, c = t[i] * t[i], before[i] * before[i], middle[i] * middle[i]
+        inverse = 1.0 / ((1.0 + a) * (1.0 + b) * (1.0 + c))
+        new = stretched * (1.0 - a) * ((1.0 + b) * (1.0 + c) * inverse)
+        old = stretched_before * (1.0 - b) * ((1.0 + a) * (1.0 + c) * inverse)
+        mid = 4.0 * product * inverse_root(product) * (1.0 - c) * ((1.0 + a) * (1.0 + b) * inverse)
         done = (
-            warp_modulus * (new * e1[i] + mid * m1 + old * o1[i]) * (e1[i] - o1[i])
-            + weft_modulus * (new * e2[i] + mid * m2 + old * o2[i]) * (e2[i] - o2[i])
-            + (new * tau[i] + mid * tau_middle[i] + old * tau_before[i]) * angle_between(t[i], before[i])
+            warp_modulus * (new * e1 + mid * (0.5 * (e1 + o1)) + old * o1) * (e1 - o1)
+            + weft_modulus * (new * e2 + mid * (0.5 * (e2 + o2)) + old * o2) * (e2 - o2)
+            + (new * tau[i] + mid * tau_middle[i] + old * tau_before[i]) * angle_between(t[i], before[i], root[i])
         )
         work = state[field + s + s + s + i] + traits[volume + i] / 6.0 * done
-        state[field + i] = g11[i] - 1.0
-        state[field + s + i] = g22[i] - 1.0
+        state[field + i] = g1 - 1.0
+        state[field + s + i] = g2 - 1.0
         state[field + s + s + i] = t[i]
         state[field + s + s + s + i] = work
         total[i] += work
@@ -227,14 +233,12 @@ def enter_ledger(
     # taken out of their arrays once: each view counts its references, which takes as long as a few crossings
     sums = np.zeros((ENTRIES, stride))
     kinetic, connectors, work, hourglass, contact, closed = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
-    scratch = np.zeros((18, stride))
-    g11, g22, g12, h11, h22, e1, e2, o1, o2 = (
-        scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5], scratch[6], scratch[7], scratch[8]
-    )  # fmt: skip
+    scratch = np.zeros((13, stride))
+    g11, g22, g12, root = scratch[0], scratch[1], scratch[2], scratch[3]
     t, before, middle, tau, tau_before, tau_middle = (
-        scratch[9], scratch[10], scratch[11], scratch[12], scratch[13], scratch[14]
+        scratch[4], scratch[5], scratch[6], scratch[7], scratch[8], scratch[9]
     )  # fmt: skip
-    x, y, z = scratch[15], scratch[16], scratch[17]
+    x, y, z = scratch[10], scratch[11], scratch[12]
     halves = np.full(stride, 0.5)
     weights = traits if half_cells else halves
     tractions = grip.reshape(-1)
@@ -273,17 +277,13 @@ def enter_ledger(
             membrane[7], closed,
         )  # fmt: skip
         field = row + s * np.uint64(at.LEDGER)
-        tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, h11, h22)
-        log_row(g11, count, series, len(series), x, y, e1)
-        log_row(g22, count, series, len(series), x, y, e2)
-        log_row(h11, count, series, len(series), x, y, o1)
-        log_row(h22, count, series, len(series), x, y, o2)
+        tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, root)
         shear_row(t, count, shear_law, sd, sp, x, tau)
         shear_row(before, count, shear_law, sd, sp, x, tau_before)
         shear_row(middle, count, shear_law, sd, sp, x, tau_middle)
         work_row(
-            state, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4],
-            g11, g22, t, e1, e2, tau, h11, h22, before, o1, o2, tau_before, middle, tau_middle, work,
+            state, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4], series,
+            g11, g22, t, tau, before, tau_before, middle, tau_middle, root, work,
         )  # fmt: skip
     out = np.zeros(ENTRIES)
     for k in range(ENTRIES):

@@ -206,7 +206,7 @@ class Simulation:
         self._entry = energies.enter_ledger(
             sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index,
             layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools, self.density,
-            material.membrane, material.series, warp, weft, shear, material.shapes,
+            material.membrane, tuple(material.series), warp, weft, shear, material.shapes,
             grid.warp_pitch, grid.weft_pitch, machine.tools, machine.poses, machine.grip,
         )  # fmt: skip
         return self._entry

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numba import cuda
 
-from weftform.mechanics.angles import angle_between, cosine, mean_half_tangent
+from weftform.mechanics.angles import angle_between, mean_half_tangent, root_of_secants
 from weftform.mechanics.connector import connector_energy
 from weftform.mechanics.contact import rounded_edge
 from weftform.mechanics.membrane import half_tangent, log_stretch, shear_stress
@@ -79,6 +79,12 @@ def chosen(first, condition, second):
     if condition:
         return first
     return second
+
+
+@device_function
+def cosine_of(t):
+    """``cos(gamma)`` from ``tan(gamma / 2)``."""
+    return (1.0 - t * t) / (1.0 + t * t)
 
 
 @device_function
@@ -243,8 +249,8 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     i1, i2 = membrane[0], membrane[1]
     rounded, tangent = device_function(rounded_edge), device_function(half_tangent)
     stress, log_of = device_function(shear_stress), device_function(log_stretch)
-    half_way, change_of, cos_of = (
-        device_function(mean_half_tangent), device_function(angle_between), device_function(cosine)
+    half_way, change_of, root_of = (
+        device_function(mean_half_tangent), device_function(angle_between), device_function(root_of_secants)
     )  # fmt: skip
     cell_vectors = compile_cell_vectors(layout, constants)
 
@@ -285,21 +291,22 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         field = n + memory
         h1, h2, before = vector_at(kept, field, stride)
         h11, h22 = 1.0 + h1, 1.0 + h2
-        middle = half_way(now, before)
+        root = root_of(now, before)
+        middle = half_way(now, before, root)
         e1, e2, o1, o2 = log_of(g11, series), log_of(g22, series), log_of(h11, series), log_of(h22, series)
         m1 = 0.5 * (e1 + o1)
         m2 = 0.5 * (e2 + o2)
         stretched, stretched_before = math.sqrt(g11 * g22), math.sqrt(h11 * h22)
-        old = stretched_before * cos_of(before)
-        mid = math.sqrt(stretched * stretched_before) * cos_of(middle)
-        new = stretched * cos_of(now)
+        old = stretched_before * cosine_of(before)
+        mid = math.sqrt(stretched * stretched_before) * cosine_of(middle)
+        new = stretched * cosine_of(now)
         old_tau = stress(law[0], law[1], law[2], law[3], law[4], before)
         mid_tau = stress(law[0], law[1], law[2], law[3], law[4], middle)
         tau = stress(law[0], law[1], law[2], law[3], law[4], now)
         work = kept[field + stride + stride + stride] + volume / 6.0 * (
             membrane[2] * simpson(old * o1, mid * m1, new * e1) * (e1 - o1)
             + membrane[3] * simpson(old * o2, mid * m2, new * e2) * (e2 - o2)
-            + simpson(old * old_tau, mid * mid_tau, new * tau) * change_of(now, before)
+            + simpson(old * old_tau, mid * mid_tau, new * tau) * change_of(now, before, root)
         )
         put_vector(kept, field, stride, (g11 - 1.0, g22 - 1.0, now))
         kept[field + stride + stride + stride] = work
