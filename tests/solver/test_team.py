@@ -9,7 +9,6 @@ import pytest
 from small_problems import pressed, whole_grid
 
 from weftform.solver import team
-from weftform.solver.sheet import LEAST_ROWS, even_edges
 from weftform.solver.team import ARRIVED, CALLED_OFF, ORDERS, Team, meet, next_order
 
 
@@ -119,30 +118,3 @@ def test_threads_end_with_their_simulation():
     for thread in mine:
         thread.join(10.0)
         assert not thread.is_alive()
-
-
-# -- shares ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("bands", [1, 2, 3, 7])
-def test_bands_of_equal_rows_differ_by_a_row_at_most(bands):
-    """The first has no row before it to do again, so it gets one more."""
-    sizes = np.diff(even_edges(np.full(70, 40), bands))
-    assert sizes.sum() == 70
-    work = sizes + (np.arange(bands) > 0)
-    assert work.max() - work.min() <= 1
-
-
-@pytest.mark.parametrize("bands", [2, 3, 6])
-def test_no_band_is_too_narrow_however_uneven_the_rows(bands):
-    for cost in (np.geomspace(1, 1e6, 24), np.geomspace(1e6, 1, 24), np.eye(24)[12] * 1000 + 1):
-        edges = even_edges(cost.astype(np.int64), bands)
-        assert edges[0] == 0 and edges[-1] == 24
-        assert (np.diff(edges) >= LEAST_ROWS).all()
-
-
-def test_a_round_blank_is_shared_by_its_cells():
-    """Rows of a quarter disc get shorter: half of the area lies below 0.40 of the radius."""
-    y = (np.arange(400) + 0.5) / 400
-    cost = (1000 * np.sqrt(1.0 - y**2)).astype(np.int64)
-    assert even_edges(cost, 2)[1] / 400 == pytest.approx(0.404, abs=0.004)

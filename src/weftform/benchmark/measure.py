@@ -155,7 +155,9 @@ def weftform_case(sheet: Simulation, side: int, threads: int, contact: bool, dev
         row = (looked - marched) * made * simulation.step / between_rows
         return made, loop + row, loop
 
-    memory = (start["fields"].nbytes + start["grip"].nbytes + simulation.sheet.traits.nbytes) / side**2
+    memory = (
+        start["fields"].nbytes + start["memory"].nbytes + start["grip"].nbytes + simulation.sheet.traits.nbytes
+    ) / side**2
     work = arithmetic(sheet, *contact_shares(sheet))
     return Timed(WEFTFORM, side, threads, contact, device, lap, memory, work)
 

@@ -130,13 +130,13 @@ def hourglass_row(state, row, above, traits, trait, count, stride, weights, lowe
 
 
 @row_loop
-def tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, root):
+def tangent_row(memory, field, count, stride, g11, g22, g12, t, before, middle, root):
     """``tan(gamma / 2)`` now, at the last entry and halfway between, and what the difference of the two needs besides."""
     use_full_width()
     s = np.uint64(stride)
     for i in range(count):
         t[i] = half_tangent(g11[i], g22[i], g12[i])
-        before[i] = state[field + s + s + i]
+        before[i] = memory[field + s + s + i]
         root[i] = root_of_secants(t[i], before[i])
         middle[i] = mean_half_tangent(t[i], before[i], root[i])
 
@@ -159,7 +159,7 @@ def shear_row(t, count, law, degree, pieces, inside, out):
 
 @row_loop
 def work_row(
-    state, field, traits, volume, count, stride, warp_modulus, weft_modulus, series,
+    memory, field, traits, volume, count, stride, warp_modulus, weft_modulus, series,
     g11, g22, t, tau, before, tau_before, middle, tau_middle, root, total,
 ):  # fmt: skip
     """Work of the membrane since the last entry, by Simpson's rule straight in (ln l1, ln l2, gamma); becomes the last.
@@ -171,7 +171,7 @@ def work_row(
     s = np.uint64(stride)
     for i in range(count):
         g1, g2 = g11[i], g22[i]
-        h1, h2 = 1.0 + state[field + i], 1.0 + state[field + s + i]
+        h1, h2 = 1.0 + memory[field + i], 1.0 + memory[field + s + i]
         # ln l from l^2 (mechanics.membrane.log_stretch)
         both, both_before = (g1 + 1.0) * (g2 + 1.0), (h1 + 1.0) * (h2 + 1.0)
         inverse = 1.0 / (both * both_before)
@@ -195,23 +195,25 @@ def work_row(
             + weft_modulus * (new * e2 + mid * (0.5 * (e2 + o2)) + old * o2) * (e2 - o2)
             + (new * tau[i] + mid * tau_middle[i] + old * tau_before[i]) * angle_between(t[i], before[i], root[i])
         )
-        work = state[field + s + s + s + i] + traits[volume + i] / 6.0 * done
-        state[field + i] = g1 - 1.0
-        state[field + s + i] = g2 - 1.0
-        state[field + s + s + i] = t[i]
-        state[field + s + s + s + i] = work
+        work = memory[field + s + s + s + i] + traits[volume + i] / 6.0 * done
+        memory[field + i] = g1 - 1.0
+        memory[field + s + i] = g2 - 1.0
+        memory[field + s + s + i] = t[i]
+        memory[field + s + s + s + i] = work
         total[i] += work
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", cache=True, nogil=True)
 def enter_ledger(
-    state, traits, trait_rows, row_index, stride, fields, trait_fields, half_cells, tools, density,
+    state, memory, traits, trait_rows, row_index, stride, fields, trait_fields, half_cells, tools, density,
     membrane, series, warp_law, weft_law, shear_law, shapes, warp_pitch, weft_pitch, tool_table, poses, grip,
 ):  # fmt: skip
     """Sum the energies and integrate the membrane's work since the last entry.
 
     Parameters
     ----------
+    memory
+        What each cell was at the last entry, shape [local rows, layout.MEMORY, stride] flattened; brought up to date.
     density
         Mass per area, mass scaling included [tonne/mm2].
     shapes
@@ -276,13 +278,13 @@ def enter_ledger(
             state, row, above, traits, trait, trait_above, count, stride, weights, lower, left, half_cells, membrane[6],
             membrane[7], closed,
         )  # fmt: skip
-        field = row + s * np.uint64(at.LEDGER)
-        tangent_row(state, field, count, stride, g11, g22, g12, t, before, middle, root)
+        field = np.uint64(row_index[j] * at.MEMORY) * s
+        tangent_row(memory, field, count, stride, g11, g22, g12, t, before, middle, root)
         shear_row(t, count, shear_law, sd, sp, x, tau)
         shear_row(before, count, shear_law, sd, sp, x, tau_before)
         shear_row(middle, count, shear_law, sd, sp, x, tau_middle)
         work_row(
-            state, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4], series,
+            memory, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4], series,
             g11, g22, t, tau, before, tau_before, middle, tau_middle, root, work,
         )  # fmt: skip
     out = np.zeros(ENTRIES)

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 POSITION = 0
 VELOCITY = 3
-LEDGER = 6
-"""Per cell: ln l1, ln l2, shear angle at the last ledger entry, and the membrane work accumulated so far."""
-FIRST_OPTIONAL = 10
+FIRST_OPTIONAL = 6
+
+MEMORY = 4
+"""Fields of the ledger's memory, an array beside the state that steps do not touch (:mod:`weftform.solver.energies`)."""
 
 # Traits: what never changes. Rows that are alike share one row of traits, so that the sweep hardly has to fetch them.
 INVERSE_MASS = 0
@@ -36,8 +37,12 @@ LANES = 8
 LEAD = 16
 """Unused numbers before each scratch row, so that index i - 1 exists and rows stay aligned."""
 
-WIDTHS = (16, 32, 48, 80, 112, 144, 208, 272, 400, 528, 784, 1040, 1296, 1552, 2064, 3088, 4112, 8208)
-"""Row strides that are compiled; no power of two, so that fields do not compete for the same cache sets."""
+WIDTHS = (
+    16, 24, 32, 40, 48, 56, 72, 88, 104, 120, 136, 152, 184, 216, 248, 280, 328, 376, 440, 504, 584, 712, 840, 1016, 1208,
+    1464, 1736, 2072, 2488, 3000, 3576, 4296, 5176, 6184, 7384, 8216,
+)  # fmt: skip
+"""Row strides that are compiled: the next is at most a fifth wider, because the processor fetches the padding too (a stride
+of 272 for 201 columns cost a fifth of a step); no multiple of 64, so that fields do not compete for the same cache sets."""
 
 
 def blocks_for(columns: int) -> int:

@@ -17,10 +17,9 @@ OUT_OF_THE_WAY = 1.0e5
 """Height of crossings that are not part of the blank [mm]."""
 CACHE_LINE = 64
 """Bytes; arrays begin on a multiple, so that the widest vectors never straddle two."""
-ROW_COST = 8
-"""Crossings whose work is that of beginning and ending a row."""
-LEAST_ROWS = 2
-"""Of a band, so that no two of its neighbours share one."""
+APART = 8
+"""Bands begin at a multiple of so many local rows, so that what is kept per row shares no cache line between threads, and
+so many rows are left free between them, so that what one thread fetches ahead is not what another is changing."""
 
 
 def aligned(shape: tuple[int, ...]) -> Floats:
@@ -42,8 +41,8 @@ class Sheet:
         The blank.
     layout
         Where the fields lie.
-    bands
-        Bands of rows.
+    edges
+        Where bands of rows begin and end, shape [bands + 1] (:func:`weftform.solver.bands.share_rows`).
     volume
         Thickness [mm].
     density
@@ -53,6 +52,8 @@ class Sheet:
     ----------
     state
         shape [local rows, fields, stride].
+    memory
+        Of the ledger, shape [local rows, layout.MEMORY, stride].
     traits, trait_rows
         Rows of traits, shape [distinct rows, trait fields, stride], and which of them a local row has.
     row_index
@@ -67,20 +68,18 @@ class Sheet:
         Scratch of each band.
     """
 
-    def __init__(self, grid: YarnGrid, layout: Layout, bands: int, volume: float, density: float) -> None:
-        self.grid, self.layout, self.bands = grid, layout, bands
+    def __init__(self, grid: YarnGrid, layout: Layout, edges: Ints, volume: float, density: float) -> None:
+        self.grid, self.layout, self.bands = grid, layout, len(edges) - 1
         self.rows, self.columns = grid.shape
-        spans = row_spans(grid.active)
-        cost = spans[:, 5] + ROW_COST
-        cost[-1] = ROW_COST  # there are no cells above it
-        self._lay_out_bands(even_edges(cost, bands))
+        self._lay_out_bands(edges)
         self.state = aligned((self.local_rows, layout.fields, layout.stride))
+        self.memory = aligned((self.local_rows, at.MEMORY, layout.stride))
         self._place_crossings()
         self._traits = self._describe(volume, density)
         self._share_traits()
-        self.spans: Ints = self._spread(spans)
-        self.edge = aligned((bands, layout.edge_scratch))
-        self.node = aligned((bands, layout.node_scratch))
+        self.spans: Ints = self._spread(row_spans(grid.active))
+        self.edge = aligned((self.bands, layout.edge_scratch))
+        self.node = aligned((self.bands, layout.node_scratch))
 
     def _lay_out_bands(self, edges: Ints) -> None:
         bands = self.bands
@@ -91,6 +90,7 @@ class Sheet:
         for band in range(bands):
             first = edges[band] - (1 if band > 0 else 0)
             last = edges[band + 1] - 1 + (1 if band < bands - 1 else 0)
+            local = -(-local // APART) * APART + (APART if band else 0)
             self.bounds[band] = local, local + last - first
             for row in range(first, last + 1):
                 if edges[band] <= row < edges[band + 1]:
@@ -198,31 +198,6 @@ class Sheet:
     def vectors(self, first: int) -> Floats:
         """Three fields of the state, shape [rows, columns, 3]."""
         return np.stack([self.state[self.row_index, first + c, : self.columns] for c in range(3)], axis=-1)
-
-
-def even_edges(cost: Ints, bands: int) -> Ints:
-    """Where bands of rows begin and end so that each has the same work, as nearly as whole rows allow.
-
-    Parameters
-    ----------
-    cost
-        Of each row, shape [rows].
-    bands
-        At most half as many as rows.
-
-    Returns
-    -------
-    shape [bands + 1]. Each band but the first also has the work of the row before it, whose cells its own first row needs.
-    """
-    until = np.concatenate([[0], np.cumsum(cost)])
-    again = np.maximum(np.arange(bands + 1) - 1, 0) * cost.max()
-    wanted = np.arange(bands + 1) / bands * (until[-1] + again[-1]) - again
-    edges = np.searchsorted(until, wanted - 0.5 * cost.max())
-    inner = np.arange(bands + 1) * LEAST_ROWS
-    edges = np.maximum.accumulate(np.maximum(edges - inner, 0)) + inner
-    shared: Ints = np.minimum(edges, len(cost) - inner[::-1]).astype(np.int64)
-    shared[-1] = len(cost)
-    return shared
 
 
 def inertia_area(grid: YarnGrid) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from weftform.errors import UnstableRun
 from weftform.solver import energies, loop, survey
 from weftform.solver import layout as at
+from weftform.solver.bands import share_rows
 from weftform.solver.layout import Layout, stride_for
 from weftform.solver.machine import Machine
 from weftform.solver.material import Material
@@ -67,7 +68,7 @@ class Simulation:
             int(problem.driven is not None),
             *self.material.shapes,
         )
-        self.sheet = Sheet(grid, self.layout, self.bands, fabric.thickness, self.density)
+        self.sheet = Sheet(grid, self.layout, share_rows(problem, self.bands), fabric.thickness, self.density)
         self.machine = Machine(problem, self.sheet)
         self._driver: CudaDriver | None = None
         if device == "cuda":
@@ -204,7 +205,7 @@ class Simulation:
         grid = self.problem.grid
         warp, weft, shear = material.laws
         self._entry = energies.enter_ledger(
-            sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index,
+            sheet.state.reshape(-1), sheet.memory.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.row_index,
             layout.stride, layout.fields, layout.traits, layout.half_cells, layout.tools, self.density,
             material.membrane, tuple(material.series), warp, weft, shear, material.shapes,
             grid.warp_pitch, grid.weft_pitch, machine.tools, machine.poses, machine.grip,
@@ -233,6 +234,7 @@ class Simulation:
         self._sync()
         return {
             "fields": self.sheet.state[self.sheet.row_index],
+            "memory": self.sheet.memory[self.sheet.row_index],
             "poses": self.machine.poses.copy(),
             "clock": self.clock.copy(),
             "driven": self.machine.driven.copy(),
@@ -257,6 +259,7 @@ class Simulation:
         if fields.shape != expected:
             raise ValueError(f"its state has shape {fields.shape}, not {expected}")
         sheet.state[sheet.row_index] = fields
+        sheet.memory[sheet.row_index] = saved["memory"]
         sheet.fill_halos()
         self.machine.poses[:] = saved["poses"]
         self.clock[:] = saved["clock"]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from weftform.errors import DeviceError
 from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, survey
+from weftform.solver import layout as at
 from weftform.solver.cuda import looking
 from weftform.solver.cuda.functions import SIMULATED, python_function
 from weftform.solver.cuda.gpu import find_gpu
@@ -107,7 +108,9 @@ class CudaDriver:
     def _check_memory(self) -> None:
         sheet, heats = self.sheet, 8 * self._accounts * (1 + self.layout.tools)
         moving = sheet.state[:, :MOVING].nbytes
-        needed = sheet.state.nbytes + moving + sheet.traits.nbytes + self.machine.grip.nbytes + heats
+        needed = (
+            sheet.state.nbytes + sheet.memory.nbytes + moving + sheet.traits.nbytes + self.machine.grip.nbytes + heats
+        )
         if needed > self.gpu.memory:
             raise DeviceError(
                 "the blank does not fit into the memory of the GPU",
@@ -131,7 +134,8 @@ class CudaDriver:
     def send(self) -> None:
         """Replace what is on the device by what the host has."""
         state = self.sheet.state
-        moving, kept = state[:, :MOVING].reshape(-1), state[:, MOVING:].reshape(-1)
+        moving = state[:, :MOVING].reshape(-1)
+        kept = np.concatenate([self.sheet.memory, state[:, MOVING:]], axis=1).reshape(-1)
         self._now, self._new, self._kept, self._grip = _on_device(moving, moving, kept, self.machine.grip.reshape(-1))
         self._clear_heats()
         self._ahead: set[str] = set()
@@ -145,17 +149,16 @@ class CudaDriver:
         Parameters
         ----------
         parts
-            ``moving`` (positions and velocities), ``kept`` (all other fields of the state), ``grip``, ``heats``; all
-            of them without.
+            ``moving`` (positions and velocities), ``kept`` (forces where crossings are driven, and the ledger's memory),
+            ``grip``, ``heats``; all of them without.
         """
         for part in self._ahead & set(parts or ALL_PARTS):
             self._ahead.discard(part)
             if part == "moving":
                 self.sheet.state[:, :MOVING] = self._now.copy_to_host().reshape(self.rows, MOVING, -1)
             elif part == "kept":
-                self.sheet.state[:, MOVING:] = self._kept.copy_to_host().reshape(
-                    self.rows, kept_fields(self.layout), -1
-                )
+                kept = self._kept.copy_to_host().reshape(self.rows, kept_fields(self.layout), -1)
+                self.sheet.memory[:], self.sheet.state[:, MOVING:] = kept[:, : at.MEMORY], kept[:, at.MEMORY :]
             elif part == "grip" and self.layout.tools:
                 self._grip.copy_to_host(self.machine.grip.reshape(-1))
             elif part == "heats":

@@ -12,7 +12,7 @@ from weftform.solver import layout as at
 from weftform.solver.layout import Layout
 from weftform.solver.material import Material
 
-MOVING = at.LEDGER
+MOVING = at.FIRST_OPTIONAL
 """Fields that a step changes for every crossing: position and velocity, kept twice."""
 SHARED_BYTES = 48 * 1024
 """Shared memory that a block may have on every GPU without asking."""
@@ -37,8 +37,8 @@ COMPILE_ONLY = -1
 
 
 def kept_fields(layout: Layout) -> int:
-    """Fields of the state that a step does not move: the ledger, and the force where crossings are driven."""
-    return layout.fields - MOVING
+    """Fields that a step does not move: the ledger's memory, and the force where crossings are driven."""
+    return at.MEMORY + layout.fields - MOVING
 
 
 @dataclass(frozen=True, eq=False)

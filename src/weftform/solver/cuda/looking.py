@@ -235,7 +235,6 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
     lower_weight, left_weight, mirror_field, mirror_z_field = (
         np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
     )
-    memory = np.uint64((at.LEDGER - MOVING) * layout.stride)
     half_cells, tools = bool(layout.half_cells), layout.tools
     entries = energies.ENTRIES
     kinetic, connectors, membrane_work, hourglass, contact, closed = (
@@ -288,8 +287,7 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         g11 = dot(g1, g1)
         g22 = dot(g2, g2)
         now = tangent(g11, g22, dot(g1, g2))
-        field = n + memory
-        h1, h2, before = vector_at(kept, field, stride)
+        h1, h2, before = vector_at(kept, n, stride)
         h11, h22 = 1.0 + h1, 1.0 + h2
         root = root_of(now, before)
         middle = half_way(now, before, root)
@@ -303,13 +301,13 @@ def compile_ledger(layout: Layout, constants: Constants, threads: int) -> Any:
         old_tau = stress(law[0], law[1], law[2], law[3], law[4], before)
         mid_tau = stress(law[0], law[1], law[2], law[3], law[4], middle)
         tau = stress(law[0], law[1], law[2], law[3], law[4], now)
-        work = kept[field + stride + stride + stride] + volume / 6.0 * (
+        work = kept[n + stride + stride + stride] + volume / 6.0 * (
             membrane[2] * simpson(old * o1, mid * m1, new * e1) * (e1 - o1)
             + membrane[3] * simpson(old * o2, mid * m2, new * e2) * (e2 - o2)
             + simpson(old * old_tau, mid * mid_tau, new * tau) * change_of(now, before, root)
         )
-        put_vector(kept, field, stride, (g11 - 1.0, g22 - 1.0, now))
-        kept[field + stride + stride + stride] = work
+        put_vector(kept, n, stride, (g11 - 1.0, g22 - 1.0, now))
+        kept[n + stride + stride + stride] = work
         shared[membrane_work + thread] += work
 
     @device_function

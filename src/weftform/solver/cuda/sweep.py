@@ -103,7 +103,7 @@ def compile_sweep(layout: Layout, constants: Constants, tile: Tile) -> Any:
         np.uint64(field * layout.stride) for field in (at.LOWER_WEIGHT, at.LEFT_WEIGHT, at.MIRROR, at.MIRROR_Z)
     )
     half_cells, driven, tools = bool(layout.half_cells), bool(layout.driven), layout.tools
-    force_field = np.uint64((layout.force - MOVING) * layout.stride)
+    force_field = np.uint64((at.MEMORY + layout.force - MOVING) * layout.stride)
     sums = tools + layout.driven
     accumulators = SLOTS * size
     last_flag = accumulators + sums * threads
