@@ -8,6 +8,7 @@ from weftform.benchmark import bench as whole
 from weftform.benchmark import sheet
 from weftform.benchmark.machine import peak_gflops
 from weftform.benchmark.page import page
+from weftform.errors import WeftformError
 
 KEYS = {"cells", "threads", "contact", "precision", "device", "ns_per_cell_step"}
 
@@ -55,3 +56,8 @@ def test_contact_state_is_mixed():
 def test_peak_is_more_than_a_chain_of_scalars():
     """One multiply-add per clock in sequence would be below this on any processor of the last ten years."""
     assert peak_gflops(1) > 4.0
+
+
+def test_no_threads_are_refused_before_anything_is_timed():
+    with pytest.raises(WeftformError, match="number of threads cannot be had"):
+        whole.bench(sides=(12,), threads=(0,))

@@ -217,6 +217,14 @@ def test_values_out_of_range_are_refused_by_key(change, key):
     assert error.key == key
 
 
+def test_a_bad_change_is_named_and_not_a_line_of_the_file():
+    """Also one that only fails with what the file says."""
+    for change in ("blank.cell_length_mm=-1", "blank.warp_cell_mm=3", "blank.symmetry=eighth"):
+        error = refused("hemisphere-0-90", [change])
+        assert str(error).startswith(f"change {change}, key {change.partition('=')[0]}: ")
+        assert error.line is None
+
+
 @pytest.mark.parametrize(
     ("change", "key", "hint"),
     [
@@ -316,7 +324,7 @@ def test_cell_length_that_gives_no_cell_is_refused(name, length):
     error = refused(name, {"blank.cell_length_mm": length})
     assert "no cell" in error.message
     assert error.key == "blank.cell_length_mm"
-    assert error.line is not None
+    assert str(error.file) == f"change blank.cell_length_mm={length}"
 
 
 @pytest.mark.parametrize("length", [0.016, 1e-3, 1e-12])

@@ -14,6 +14,7 @@ from weftform.benchmark.measure import Timed, reference_case, take_laps, weftfor
 from weftform.benchmark.reference import ReferenceMissing
 from weftform.benchmark.sheet import MAKERS, SOURCE_CELLS, formed_sheet, formed_source
 from weftform.errors import WeftformError
+from weftform.processors import threads_for
 from weftform.solver.cuda.gpu import find_gpu
 
 SIDES = (56, 200, 700)
@@ -75,7 +76,7 @@ def bench(
     Raises
     ------
     WeftformError
-        A device that is not there; nothing has been timed.
+        A device that is not there, or a number of threads that cannot be had; nothing has been timed.
     """
     say: Watch = watch or (lambda what, share: None)
     unknown = [device for device in devices if device not in MAKERS]
@@ -85,7 +86,7 @@ def bench(
         )
     if "cuda" in devices:
         find_gpu()
-    numbers = sorted(set(threads or (1, processors())))
+    numbers = sorted({threads_for(0, n) for n in threads or (1, processors())})
     notes: list[str] = []
     say("peaks of the machine", 0.0)
     machine = describe(numbers)

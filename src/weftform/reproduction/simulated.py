@@ -357,7 +357,7 @@ def hemisphere_items(results: Results) -> list[Item]:
 
 
 def convergence_items(results: Results) -> list[Item]:
-    """The hemisphere at 0/90 with other meshes, at half the speed and as a full model, against the shipped study."""
+    """The hemisphere at 0/90 with other meshes, at a third of the speed and as a full model, against the shipped study."""
     section = "Hemisphere, 0/90 degrees: mesh, speed and symmetry"
     base = results["hemisphere-0-90"].summary
     items = []

@@ -79,14 +79,14 @@ class Study:
                 hint="`weftform studies` lists the shipped studies, `weftform new` writes one to start from",
             )
         values, text = read_toml(path, StudyError)
-        pairs = changes.items() if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
-        for key, value in pairs:
+        pairs = dict(changes.items() if isinstance(changes, Mapping) else (_split_change(c) for c in changes))
+        for key, value in pairs.items():
             values = _changed(values, key.split("."), _from_here(key, value))
-        made = cls(_validated(values, path, text), path.resolve())
         try:
+            made = cls(_validated(values, path, text), path.resolve())
             made.check()
         except (StudyError, CardError) as problem:
-            raise _placed(problem, path, text) from None
+            raise _placed(problem, path, text, pairs) from None
         return made
 
     def check(self) -> None:
@@ -296,14 +296,20 @@ def _changed(values: dict[str, Any], path: list[str], value: Any) -> dict[str, A
     return merge_tables(values, {path[0]: nested})
 
 
-def _placed(problem: StudyError | CardError, path: Path, text: str) -> StudyError | CardError:
-    """The same error with the file and line of the study where it names a key of the study."""
-    if problem.file is not None:
-        return problem
-    line = line_of(text, tuple(problem.key.split("."))) if problem.key else None
+def _placed(
+    problem: StudyError | CardError, path: Path, text: str, changes: Mapping[str, Any]
+) -> StudyError | CardError:
+    """The same error with its place: the change that it is about, or else the file and line of a key of the study."""
+    change = next((key for key in changes if problem.key and f"{problem.key}.".startswith(f"{key}.")), None)
+    place: Path | str | None = problem.file
+    line = problem.line
+    if change is not None:
+        place, line = f"change {change}={changes[change]}", None
+    elif place is None:
+        place, line = path, line_of(text, tuple(problem.key.split("."))) if problem.key else None
     return type(problem)(
         problem.message,
-        file=path,
+        file=place,
         line=line,
         key=problem.key,
         expected=problem.expected,
