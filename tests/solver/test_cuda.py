@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -16,7 +15,6 @@ from cuda_cases import CASES, compute
 from weftform.errors import DeviceError
 from weftform.execution import run
 from weftform.result import Result
-from weftform.solver.cuda.interrupts import uninterrupted
 from weftform.study import Study
 
 STEPS = 200
@@ -136,38 +134,3 @@ def test_threads_and_a_gpu_exclude_each_other(tmp_path):
     with pytest.raises(DeviceError, match="no such device"):
         run("hemisphere-0-90", tmp_path / "out", device="abacus")
     assert list(tmp_path.iterdir()) == []
-
-
-# -- interruption ------------------------------------------------------------------------------------------------------
-
-
-def test_ctrl_c_waits_for_the_end_of_a_batch():
-    done = []
-    # a shell ignores the signal for what it starts in the background, and this process may have inherited that
-    former = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt), uninterrupted():
-            signal.raise_signal(signal.SIGINT)
-            done.append("batch")
-        assert done == ["batch"]
-        with pytest.raises(KeyboardInterrupt):  # the usual answer is back
-            signal.raise_signal(signal.SIGINT)
-    finally:
-        signal.signal(signal.SIGINT, former)
-
-
-# -- machine code ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
-def test_kernels_compile_for_a_real_gpu(case):
-    """The simulator runs Python; that the compiler takes the kernels, without local memory, is seen without a GPU too."""
-    pytest.importorskip("numba_cuda", reason="needs weftform[cuda]")
-    done = subprocess.run(
-        [sys.executable, Path(__file__).parent / "cuda_compile.py", case], capture_output=True, text=True, check=False
-    )
-    if "no compiler" in done.stdout:
-        pytest.skip("needs the CUDA toolkit of weftform[cuda]")
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert done.stdout.split() == ["sweep", "survey", "ledger", "start"]

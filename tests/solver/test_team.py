@@ -109,6 +109,31 @@ def test_an_error_in_the_work_reaches_the_caller():
         group.work(broken)
 
 
+def test_an_error_in_another_thread_reaches_the_caller_too():
+    """The first, who waits for it at the beginning, leaves."""
+    game = Game(2)
+
+    def broken(band, order):
+        if band == 1:
+            raise ValueError("band 1")
+        return game.play(band, order)
+
+    with pytest.raises(ValueError, match="band 1"):
+        game.team.work(broken)
+    assert (game.tally == 0).all()
+    game.round()
+    assert (game.tally == game.turns).all()
+
+
+def test_compiling_makes_no_step_and_wakes_nobody():
+    simulation = pressed(whole_grid(12, 16), threads=3)
+    simulation.compile()
+    assert simulation.steps == 0 and simulation.time == 0.0
+    assert not simulation._team._tasks
+    simulation.advance_to(20.5 * simulation.step)
+    assert simulation.steps == 21
+
+
 def test_threads_end_with_their_simulation():
     simulation = pressed(whole_grid(12, 16), threads=3)
     simulation.advance_to(1e-5)

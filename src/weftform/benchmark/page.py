@@ -82,8 +82,9 @@ def _targets(cases: list[dict[str, Any]]) -> list[str]:
             same = (case["cells"], case["contact"], case["threads"]) == (side**2, contact, threads)
             if same and case["program"] == "weftform" and "ratio_to_c" in case:
                 verdict = "met" if case["ratio_to_c"] <= limit else "missed"
+                on = "1 thread" if threads == 1 else f"{threads} threads"
                 lines.append(
-                    f"| {side} x {side}, {'contact' if contact else 'no contact'}, {threads} threads | {limit} x C | "
+                    f"| {side} x {side}, {'contact' if contact else 'no contact'}, {on} | {limit} x C | "
                     f"{case['ratio_to_c']:.2f} | {case['loop_ratio_to_c']:.2f} | {verdict} |"
                 )
     return lines

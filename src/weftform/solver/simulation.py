@@ -14,6 +14,7 @@ from weftform.errors import UnstableRun
 from weftform.solver import energies, loop, survey
 from weftform.solver import layout as at
 from weftform.solver.bands import share_rows
+from weftform.solver.interrupts import uninterrupted
 from weftform.solver.layout import Layout, stride_for
 from weftform.solver.machine import Machine
 from weftform.solver.material import Material
@@ -141,15 +142,16 @@ class Simulation:
             most = min(SURVEY_EVERY, 8 + 4 * self._surveys)
             # up to the stop in batches of one size: a last one of a few steps costs as much around it as a long one
             ahead = (stop - self.time) / self.step
-            made = self._advance(max(1, math.ceil(ahead / max(1.0, math.ceil(ahead / most)))), stop)
-            self._surveys += 1
-            self._before = self.last
-            self.last = self._survey()
-            if not self.last[survey.FINITE]:
-                self._report_blow_up()
-            if self._surveys % LEDGER_EVERY == 0:
-                self._enter_ledger()
-            self._choose_step()
+            with uninterrupted():
+                made = self._advance(max(1, math.ceil(ahead / max(1.0, math.ceil(ahead / most)))), stop)
+                self._surveys += 1
+                self._before = self.last
+                self.last = self._survey()
+                if not self.last[survey.FINITE]:
+                    self._report_blow_up()
+                if self._surveys % LEDGER_EVERY == 0:
+                    self._enter_ledger()
+                self._choose_step()
             if watch is not None:
                 watch(self)
             if made == 0:
@@ -227,7 +229,10 @@ class Simulation:
         if self._driver is not None:
             self._driver.compile()
             return
-        self._advance(0, 0.0)
+        # by this thread alone: the others would only wait for it, and an interrupt for them
+        self._batch[:] = 0.0
+        self._team.call_off()
+        self._march(0, 0)
 
     def checkpoint(self) -> dict[str, Floats]:
         """Everything that :meth:`restore` needs to go on."""

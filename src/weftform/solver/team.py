@@ -204,6 +204,11 @@ class Team:
 
         ``work`` takes orders (:func:`next_order`) until there is none. For each it begins with a :func:`meet` and changes
         nothing before; where that says False it takes no other.
+
+        Raises
+        ------
+        BaseException
+            What ``work`` raised in any of the threads.
         """
         if self._pool is None:
             return work(0, 0)
@@ -215,9 +220,24 @@ class Team:
                 before = _give_order(self.gate, band)
                 if before & 1:
                     self._tasks = [task for task in self._tasks if not task.done()]
-                    self._tasks.append(self._pool.submit(work, band, before >> 1))
-            return work(0, 0)
+                    self._tasks.append(self._pool.submit(self._guarded, work, band, before >> 1))
+            done = work(0, 0)
         except BaseException:
             # An interrupt comes before this thread is in the work, or after. Before, the others wait for it in vain.
-            self.gate[CALLED_OFF] = 1
+            self.call_off()
+            raise
+        if self.gate[CALLED_OFF]:
+            for task in self._tasks:
+                task.result()
+        return done
+
+    def call_off(self) -> None:
+        """Let those who wait for the others at the beginning of an order leave, and nobody begin until the next."""
+        self.gate[CALLED_OFF] = 1
+
+    def _guarded(self, work: Callable[[int, int], int], band: int, order: int) -> None:
+        try:
+            work(band, order)
+        except BaseException:
+            self.call_off()
             raise

@@ -20,7 +20,6 @@ from weftform.solver import layout as at
 from weftform.solver.cuda import looking
 from weftform.solver.cuda.functions import SIMULATED, python_function
 from weftform.solver.cuda.gpu import find_gpu
-from weftform.solver.cuda.interrupts import uninterrupted
 from weftform.solver.cuda.launch import COMPILE_ONLY, MOVING, S_TOOLS, Constants, Tile, kept_fields, tile_for
 from weftform.solver.cuda.sweep import compile_sweep, start_driven
 from weftform.solver.layout import Layout
@@ -175,10 +174,6 @@ class CudaDriver:
         ``viscosity`` is that of the dashpots times the area of a cell [mm2].
         Clock, tools and driven crossings are brought up to date, as by the time loop of the processor.
         """
-        with uninterrupted():
-            return self._advance(clock, steps, stop, viscosity)
-
-    def _advance(self, clock: Floats, steps: int, stop: float, viscosity: float) -> int:
         machine = self.machine
         plan = self._schedule(clock, steps, stop, viscosity)
         made = len(plan) - 1

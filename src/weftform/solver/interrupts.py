@@ -1,6 +1,7 @@
 """Ctrl-C between batches of steps, never inside one.
 
-The processor's time loop is one compiled call, which Ctrl-C cannot break. On the GPU a batch is many launches from Python.
+A batch ends with the survey that chooses the next step; a run that was interrupted before it would go on with other steps
+than one that was not. On the GPU a batch is many launches from Python besides.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from typing import Any
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold Ctrl-C back until a batch of steps is whole, so that clock, tools and state are of the same instant."""
-    if threading.current_thread() is not threading.main_thread():
+    # signals are for the main thread, and a handler that Python did not set could not be put back
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
         yield
         return
     held_back: list[Any] = []
