@@ -15,6 +15,7 @@ from weftform.cases import case_of
 from weftform.errors import CardError, ResultError, StudyError, UnstableRun
 from weftform.exchange.vtkhdf import Series
 from weftform.execution import COLUMNS, run
+from weftform.fabric.fabric import shipped_cards
 from weftform.result import Result
 from weftform.study import Study
 
@@ -256,7 +257,10 @@ def test_interrupted_run_keeps_its_outputs_and_resumes_to_the_same_numbers(domes
     assert len(times) <= 41 + 1
 
 
-def test_checkpoint_of_another_study_is_refused(tmp_path):
+@pytest.fixture
+def interrupted(tmp_path):
+    """Folder of a run that was interrupted early."""
+
     def interrupt(progress):
         if progress.share > 0.1:
             raise KeyboardInterrupt
@@ -264,8 +268,49 @@ def test_checkpoint_of_another_study_is_refused(tmp_path):
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         run(Study.load("hemisphere-0-90", SMALL), out, watch=interrupt)
-    with pytest.raises(ResultError, match="does not belong to this study"):
-        run(Study.load("hemisphere-0-90", {**SMALL, "blank.cell_length_mm": 6.0}), out, resume=True)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("blank.cell_length_mm", 6.0), ("contact.punch.friction", 0.5), ("loading.stroke_mm", 25.0), ("output.rows", 40)],
+)
+def test_resuming_another_study_is_refused_by_key(interrupted, key, value):
+    kept = {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()}
+    with pytest.raises(ResultError, match="began with another value") as caught:
+        run(Study.load("hemisphere-0-90", {**SMALL, key: value}), interrupted, resume=True)
+    assert caught.value.key == key and caught.value.got == str(value)
+    assert {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()} == kept
+
+
+def test_resuming_with_another_card_is_refused(tmp_path):
+    card = tmp_path / "card.toml"
+    card.write_text(shipped_cards()["hexforce-48600-c1300"].read_text())
+    study = {**SMALL, "fabric.card": str(card)}
+
+    def interrupt(progress):
+        if progress.share > 0.1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(Study.load("hemisphere-0-90", study), tmp_path / "out", watch=interrupt)
+    card.write_text(card.read_text().replace("thickness_mm = 0.62", "thickness_mm = 0.6"))
+    with pytest.raises(ResultError, match="the fabric card has changed"):
+        run(Study.load("hemisphere-0-90", study), tmp_path / "out", resume=True)
+
+
+@pytest.mark.parametrize("content", [lambda old: old[:20000], lambda old: b"garbage", lambda old: b""])
+def test_a_damaged_checkpoint_is_called_so(interrupted, content):
+    checkpoint = interrupted / "checkpoint.npz"
+    checkpoint.write_bytes(content(checkpoint.read_bytes()))
+    with pytest.raises(ResultError, match="checkpoint is damaged"):
+        run(Study.load("hemisphere-0-90", SMALL), interrupted, resume=True)
+
+
+def test_an_interrupted_run_goes_on_from_the_study_in_its_folder(interrupted):
+    """As the command line says after an interrupt; and what is not known yet is no warning."""
+    assert Result.open(interrupted).summary["warnings"] == []
+    assert run(interrupted / "study.toml", interrupted, resume=True).summary["status"] == "done"
 
 
 def test_nothing_to_resume_is_refused(tmp_path):

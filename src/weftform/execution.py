@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import math
 import os
 import time
+import tomllib
+import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weftform.cases import Case, case_of
 from weftform.errors import ResultError, UnstableRun
@@ -109,6 +114,8 @@ def run(
     check_device(device, threads)
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
+    if resume:
+        _check_same(study, out / "study.toml")
     Run(case_of(study), out, threads, watch, resume, device).go()
     return Result.open(out)
 
@@ -296,7 +303,7 @@ class Run:
         study, grid, simulation = self.study, self.grid, self.simulation
         fields = self._last_sound
         energy = energy_summary(self.rows)
-        warnings = doubts(energy, self.peak_penetration / study.fabric.thickness)
+        warnings = doubts(energy, self.peak_penetration / study.fabric.thickness, whole=status == "done")
         values: dict[str, Any] = {
             "study": study.name,
             "ok": status == "done" and not warnings,
@@ -330,6 +337,7 @@ class Run:
     def _checkpoint(self, stop: float) -> None:
         state = self.simulation.checkpoint()
         extra = {
+            "fabric": _fingerprint(self.study),
             "history": np.array([[row[c] for c in self.columns] for row in self.rows]),
             "progress": np.array([stop, self.peak_penetration, self.wall]),
         }
@@ -341,17 +349,70 @@ class Run:
     def _restore(self) -> None:
         path = self.out / "checkpoint.npz"
         try:
-            with np.load(path) as data:
-                self.simulation.restore({k: data[k] for k in data.files})
-                self.rows = [dict(zip(self.columns, (float(v) for v in row), strict=True)) for row in data["history"]]
-                self._resumed_to, self.peak_penetration, self.wall = (float(v) for v in data["progress"])
-                self._last_sound = self._fields()
-        except (OSError, ValueError, KeyError) as problem:
+            with np.load(path) as file:
+                data = {name: file[name] for name in file.files}
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+            raise ResultError(
+                "the checkpoint is damaged",
+                file=path,
+                hint="run anew without --resume; what was computed stays readable",
+            ) from None
+        try:
+            if not np.array_equal(data["fabric"], _fingerprint(self.study)):
+                raise ValueError("the fabric card has changed")
+            self.simulation.restore(data)
+            self.rows = [dict(zip(self.columns, (float(v) for v in row), strict=True)) for row in data["history"]]
+            self._resumed_to, self.peak_penetration, self.wall = (float(v) for v in data["progress"])
+            self._last_sound = self._fields()
+        except (ValueError, KeyError) as problem:
             raise ResultError(
                 f"the checkpoint does not belong to this study ({problem})",
                 file=path,
                 hint="resume with the same study and changes, or run anew without --resume",
             ) from None
+
+
+MAY_CHANGE = ("name", "solver.most_steps")
+"""What an interrupted run may be resumed with although it began with something else."""
+
+
+def _check_same(study: Study, file: Path) -> None:
+    """Make sure that an interrupted run goes on with the study that it began with.
+
+    Raises
+    ------
+    ResultError
+        It is another, or the study of the folder cannot be read.
+    """
+    try:
+        begun = _leaves(tomllib.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as problem:
+        raise ResultError(f"the study of the interrupted run cannot be read ({problem})", file=file) from None
+    now = _leaves(tomllib.loads(study.to_toml()))
+    for key in sorted(begun.keys() | now.keys()):
+        if begun.get(key) != now.get(key) and key not in MAY_CHANGE:
+            raise ResultError(
+                "the interrupted run began with another value",
+                file=file,
+                key=key,
+                expected=str(begun.get(key, "none")),
+                got=str(now.get(key, "none")),
+                hint="resume with the same study and changes (this file holds them), or run anew without --resume",
+            )
+
+
+def _leaves(table: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted key."""
+    found: dict[str, Any] = {}
+    for name, value in table.items():
+        found |= _leaves(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
+    return found
+
+
+def _fingerprint(study: Study) -> NDArray[np.uint8]:
+    """Of the laws of the fabric, changes included: the card is a file of its own."""
+    card = study.fabric.card.model_dump_json()
+    return np.frombuffer(hashlib.sha256(card.encode()).digest(), np.uint8)
 
 
 def _versions() -> str:

@@ -135,10 +135,11 @@ def test_compiling_makes_no_step_and_wakes_nobody():
 
 
 def test_threads_end_with_their_simulation():
+    others = set(threading.enumerate())
     simulation = pressed(whole_grid(12, 16), threads=3)
     simulation.advance_to(1e-5)
-    mine = [thread for thread in threading.enumerate() if thread.name.startswith("weftform-band")]
-    assert len(mine) >= 2
+    mine = set(threading.enumerate()) - others
+    assert len(mine) == 2 and all(thread.name.startswith("weftform-band") for thread in mine)
     del simulation
     for thread in mine:
         thread.join(10.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -50,7 +51,8 @@ def run(
             )
     except KeyboardInterrupt:
         typer.secho(f"\ninterrupted; what was computed is in {folder}", fg="yellow", err=True)
-        typer.echo(f"go on with: weftform run {study} --out {folder} --resume", err=True)
+        again = shlex.join(["weftform", "run", str(folder / "study.toml"), "--out", str(folder), "--resume"])
+        typer.echo(f"go on with: {again}", err=True)
         raise typer.Exit(1) from None
     summary = result.summary
     typer.echo("\n".join(_report(summary)))
