@@ -30,6 +30,18 @@ def test_ctrl_c_waits_for_the_end_of_a_batch():
         signal.raise_signal(signal.SIGINT)
 
 
+def test_ctrl_c_is_not_lost_where_the_batch_fails():
+    with pytest.raises(KeyboardInterrupt), uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        raise ValueError("blown up")
+
+
+def test_a_handler_of_the_system_is_left_in_place():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    with uninterrupted():
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_interrupted_again_and_again_a_run_ends_with_the_same_bits(threads):
     end, grid = 0.003, whole_grid(16, 16)

@@ -1,5 +1,7 @@
 """Threads that take orders, wait for each other, go to sleep and are called off."""
 
+import os
+import signal
 import threading
 import time
 
@@ -8,8 +10,10 @@ import numpy as np
 import pytest
 from small_problems import pressed, whole_grid
 
-from weftform.solver import team
+from weftform.cases import case_of
+from weftform.solver import Simulation, team
 from weftform.solver.team import ARRIVED, CALLED_OFF, ORDERS, Team, meet, next_order
+from weftform.study import Study
 
 
 @numba.njit(nogil=True)
@@ -132,6 +136,47 @@ def test_compiling_makes_no_step_and_wakes_nobody():
     assert not simulation._team._tasks
     simulation.advance_to(20.5 * simulation.step)
     assert simulation.steps == 21
+
+
+def test_two_threads_at_once_are_refused():
+    game = Game(2)
+
+    def meanwhile(band, order):
+        if band == 0:
+            with pytest.raises(RuntimeError, match="from two threads"):
+                game.team.work(game.play)
+        return game.play(band, order)
+
+    assert game.team.work(meanwhile) == game.turns
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_child_has_a_team_of_its_own():
+    game = Game(2)
+    game.round()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        game.round()
+        os._exit(0 if (game.tally == 2 * game.turns).all() else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+@pytest.mark.parametrize("name", ["bias-extension", "tensile-warp"])
+def test_grips_give_the_same_bits_with_any_number_of_threads(name):
+    """Where crossings are driven threads meet once more in each step."""
+    problem = case_of(Study.load(name)).problem()
+    one = Simulation(problem, 1)
+    stop = 400.5 * one.step
+    one.advance_to(stop)
+    for threads in (2, 3, 5):
+        other = Simulation(problem, threads)
+        assert other.bands > 1
+        other.advance_to(stop)
+        np.testing.assert_array_equal(other.positions, one.positions)
+        np.testing.assert_array_equal(other.driven_forces, one.driven_forces)
+        assert other.ledger() == one.ledger()
 
 
 def test_threads_end_with_their_simulation():

@@ -217,6 +217,20 @@ def test_values_out_of_range_are_refused_by_key(change, key):
     assert error.key == key
 
 
+def test_the_last_of_several_changes_wins():
+    study = Study.load("hemisphere-45", ["solver.safety=0.5", "solver={safety=0.7}", "solver.safety=0.6"])
+    assert study.model.solver.safety == 0.6
+
+
+def test_a_bad_card_of_a_change_is_named_with_its_line(tmp_path):
+    card = tmp_path / "bad.toml"
+    card.write_text(
+        shipped_cards()["hexforce-48600-c1300"].read_text().replace("thickness_mm = 0.62", "thickness_mm = -1")
+    )
+    error = refused("hemisphere-45", [f"fabric.card={card}"], CardError)
+    assert str(error).startswith(f"{card}, line 10, key fabric.thickness_mm: ")
+
+
 def test_a_bad_change_is_named_and_not_a_line_of_the_file():
     """Also one that only fails with what the file says."""
     for change in ("blank.cell_length_mm=-1", "blank.warp_cell_mm=3", "blank.symmetry=eighth"):

@@ -16,8 +16,8 @@ from typing import Any
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold Ctrl-C back until a batch of steps is whole, so that clock, tools and state are of the same instant."""
-    # signals are for the main thread, and a handler that Python did not set could not be put back
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
+    # Signals are for the main thread, and only a handler of Python's can be called later.
+    if threading.current_thread() is not threading.main_thread() or not callable(signal.getsignal(signal.SIGINT)):
         yield
         return
     held_back: list[Any] = []
@@ -26,5 +26,5 @@ def uninterrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
-    if held_back and callable(usual):
-        usual(*held_back[0])
+        if held_back and callable(usual):
+            usual(*held_back[0])

@@ -231,8 +231,7 @@ class Simulation:
             return
         # by this thread alone: the others would only wait for it, and an interrupt for them
         self._batch[:] = 0.0
-        self._team.call_off()
-        self._march(0, 0)
+        self._team.try_out(self._march)
 
     def checkpoint(self) -> dict[str, Floats]:
         """Everything that :meth:`restore` needs to go on."""

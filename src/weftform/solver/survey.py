@@ -139,8 +139,9 @@ def survey(
     weights = traits if half_cells else halves
     for j in range(rows):
         r = row_index[j]
-        begin = spans[r, 0]
-        count = np.uint64(spans[r, 1])
+        # as far as the cells above the row reach, of which a half one may have no crossing at its lower left corner
+        begin = spans[r, 4]
+        count = np.uint64(spans[r, 5])
         row = np.uint64(r * length + begin)
         above = np.uint64(row_index[min(j + 1, rows - 1)] * length + begin)
         trait = np.uint64(trait_rows[r] * trait_fields * stride + begin)

@@ -11,8 +11,9 @@ from __future__ import annotations
 import os
 import platform
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from typing import Any
 
 import numba
@@ -186,12 +187,18 @@ class Team:
         self.gate: NDArray[np.int64] = np.zeros(ORDERS + APART * members, np.int64)
         self._pool: ThreadPoolExecutor | None = None
         self._tasks: list[Future[Any]] = []
+        self._busy = threading.Lock()
+        self._start()
+
+    def _start(self) -> None:
+        self._process = os.getpid()
+        self._tasks = []
         self._reset()
-        if members > 1:
-            self._pool = ThreadPoolExecutor(members - 1, thread_name_prefix="weftform-band")
+        if self.members > 1:
+            self._pool = ThreadPoolExecutor(self.members - 1, thread_name_prefix="weftform-band")
             # each thread starts now, where a failure to start one leaves nobody waiting
-            together = threading.Barrier(members)
-            for _ in range(members - 1):
+            together = threading.Barrier(self.members)
+            for _ in range(self.members - 1):
                 self._pool.submit(together.wait)
             together.wait()
 
@@ -207,11 +214,35 @@ class Team:
 
         Raises
         ------
+        RuntimeError
+            Another thread is having this team work.
         BaseException
             What ``work`` raised in any of the threads.
         """
+        with self._alone():
+            return self._work(work)
+
+    def try_out(self, work: Callable[[int, int], int]) -> None:
+        """Call ``work`` in this thread only, called off before it begins: so it is compiled and does nothing."""
+        with self._alone():
+            self.call_off()
+            work(0, 0)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        if not self._busy.acquire(blocking=False):
+            raise RuntimeError("one simulation is advanced from two threads at the same time")
+        try:
+            yield
+        finally:
+            self._busy.release()
+
+    def _work(self, work: Callable[[int, int], int]) -> int:
         if self._pool is None:
             return work(0, 0)
+        if self._process != os.getpid():
+            # a forked child has none of the threads
+            self._start()
         if self.gate[CALLED_OFF]:
             wait(self._tasks)
             self._reset()

@@ -79,14 +79,14 @@ class Study:
                 hint="`weftform studies` lists the shipped studies, `weftform new` writes one to start from",
             )
         values, text = read_toml(path, StudyError)
-        pairs = dict(changes.items() if isinstance(changes, Mapping) else (_split_change(c) for c in changes))
-        for key, value in pairs.items():
+        pairs = list(changes.items()) if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
+        for key, value in pairs:
             values = _changed(values, key.split("."), _from_here(key, value))
         try:
             made = cls(_validated(values, path, text), path.resolve())
             made.check()
         except (StudyError, CardError) as problem:
-            raise _placed(problem, path, text, pairs) from None
+            raise _placed(problem, path, text, dict(pairs)) from None
         return made
 
     def check(self) -> None:
@@ -300,6 +300,8 @@ def _placed(
     problem: StudyError | CardError, path: Path, text: str, changes: Mapping[str, Any]
 ) -> StudyError | CardError:
     """The same error with its place: the change that it is about, or else the file and line of a key of the study."""
+    if problem.file is not None and Path(problem.file) != path:
+        return problem
     change = next((key for key in changes if problem.key and f"{problem.key}.".startswith(f"{key}.")), None)
     place: Path | str | None = problem.file
     line = problem.line
