@@ -44,7 +44,7 @@ def test_a_handler_of_the_system_is_left_in_place():
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_interrupted_again_and_again_a_run_ends_with_the_same_bits(threads):
-    end, grid = 0.003, whole_grid(16, 16)
+    end, grid = 0.02, whole_grid(16, 16)
     through = pressed(grid, friction=0.2, threads=threads)
     through.advance_to(end)
     broken = pressed(grid, friction=0.2, threads=threads)
@@ -52,7 +52,7 @@ def test_interrupted_again_and_again_a_run_ends_with_the_same_bits(threads):
     over = threading.Event()
 
     def disturb():
-        while not over.wait(0.004):
+        while not over.wait(0.001):
             os.kill(os.getpid(), signal.SIGINT)
 
     interruptions = 0
