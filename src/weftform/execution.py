@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import math
 import os
 import time
-import tomllib
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -16,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from weftform.cases import Case, case_of
 from weftform.errors import ResultError, UnstableRun
@@ -24,6 +21,7 @@ from weftform.processors import Device, check_device, crowding, threads_for, usa
 from weftform.result import Result
 from weftform.result.fields import Fields
 from weftform.result.writer import RESOLVED, ResultWriter, claim_folder, write_whole
+from weftform.resuming import check_same, fingerprint
 from weftform.solver import Ledger, Simulation, survey
 from weftform.study import Study
 from weftform.verdict import beyond_the_laws, blank_summary, doubts, energy_summary
@@ -115,7 +113,7 @@ def run(
     threads = threads_for(study.grid.cell_count, threads)
     claim_folder(out, resume=resume)
     if resume:
-        _check_same(study, out / "study.toml")
+        check_same(study, out / "study.toml")
     Run(case_of(study), out, threads, watch, resume, device).go()
     return Result.open(out)
 
@@ -337,7 +335,7 @@ class Run:
     def _checkpoint(self, stop: float) -> None:
         state = self.simulation.checkpoint()
         extra = {
-            "fabric": _fingerprint(self.study),
+            "fabric": fingerprint(self.study),
             "history": np.array([[row[c] for c in self.columns] for row in self.rows]),
             "progress": np.array([stop, self.peak_penetration, self.wall]),
         }
@@ -358,7 +356,7 @@ class Run:
                 hint="run anew without --resume; what was computed stays readable",
             ) from None
         try:
-            if not np.array_equal(data["fabric"], _fingerprint(self.study)):
+            if not np.array_equal(data["fabric"], fingerprint(self.study)):
                 raise ValueError("the fabric card has changed")
             self.simulation.restore(data)
             self.rows = [dict(zip(self.columns, (float(v) for v in row), strict=True)) for row in data["history"]]
@@ -370,49 +368,6 @@ class Run:
                 file=path,
                 hint="resume with the same study and changes, or run anew without --resume",
             ) from None
-
-
-MAY_CHANGE = ("name", "solver.most_steps")
-"""What an interrupted run may be resumed with although it began with something else."""
-
-
-def _check_same(study: Study, file: Path) -> None:
-    """Make sure that an interrupted run goes on with the study that it began with.
-
-    Raises
-    ------
-    ResultError
-        It is another, or the study of the folder cannot be read.
-    """
-    try:
-        begun = _leaves(tomllib.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as problem:
-        raise ResultError(f"the study of the interrupted run cannot be read ({problem})", file=file) from None
-    now = _leaves(tomllib.loads(study.to_toml()))
-    for key in sorted(begun.keys() | now.keys()):
-        if begun.get(key) != now.get(key) and key not in MAY_CHANGE:
-            raise ResultError(
-                "the interrupted run began with another value",
-                file=file,
-                key=key,
-                expected=str(begun.get(key, "none")),
-                got=str(now.get(key, "none")),
-                hint="resume with the same study and changes (this file holds them), or run anew without --resume",
-            )
-
-
-def _leaves(table: dict[str, Any], above: str = "") -> dict[str, Any]:
-    """Values of nested tables by dotted key."""
-    found: dict[str, Any] = {}
-    for name, value in table.items():
-        found |= _leaves(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
-    return found
-
-
-def _fingerprint(study: Study) -> NDArray[np.uint8]:
-    """Of the laws of the fabric, changes included: the card is a file of its own."""
-    card = study.fabric.card.model_dump_json()
-    return np.frombuffer(hashlib.sha256(card.encode()).digest(), np.uint8)
 
 
 def _versions() -> str:

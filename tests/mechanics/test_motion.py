@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weftform.mechanics.motion import motion_value, soft_progress
+from weftform.mechanics.motion import motion_value, pushed_velocity, soft_progress
 
 ramps = st.floats(0.01, 0.5)
 examples = settings(deadline=None, derandomize=True, max_examples=40)
@@ -81,3 +81,18 @@ def test_stands_still_at_every_knot():
         step = 1e-5
         # Within the first 1e-5 of a leg of 1 s or more the way is 6 mm times x^3 / ramp^2: below 1e-13 mm.
         assert abs(value(time + step) - value(time - step)) / (2 * step) < 1e-7
+
+
+@pytest.mark.parametrize("rate", [0.0, 50.0])
+def test_a_pushed_body_gains_what_the_force_gives_and_damping_takes(rate):
+    """Energy in each step: force times way is what kinetic energy and the heat of damping gain, to rounding."""
+    force, mass, step, velocity = 3.0, 0.2, 1e-3, 0.0
+    work = heat = 0.0
+    for _ in range(500):
+        new = pushed_velocity(velocity, force, mass, rate, step)
+        work += force * 0.5 * (velocity + new) * step
+        heat += 0.25 * rate * mass * (velocity + new) ** 2 * step
+        velocity = new
+    assert work == pytest.approx(0.5 * mass * velocity**2 + heat, rel=1e-12)
+    expected = force * 0.5 / mass if rate == 0.0 else force / (mass * rate) * (1.0 - np.exp(-rate * 0.5))
+    assert velocity == pytest.approx(expected, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Smooth prescribed motions: a value that goes from one knot to the next with soft starts and stops."""
+"""How tools move: smooth prescribed motions, soft at each knot, and a rigid body that a force pushes."""
 
 from __future__ import annotations
 
@@ -41,3 +41,13 @@ def motion_value(times: Any, values: Any, knots: int, ramp: float, time: float) 
             return value
     value = values[knots - 1]
     return value
+
+
+@scalar
+def pushed_velocity(old: float, force: float, mass: float, rate: float, step: float) -> float:
+    """Velocity half a step later of a body of ``mass`` [tonne] under a force [N], damped by ``rate`` [1/s].
+
+    Central differences with the damping on the mean of old and new velocity; it takes
+    ``rate mass (old + new)^2 step / 4`` of energy.
+    """
+    return (old * (1.0 - 0.5 * rate * step) + step * force / mass) / (1.0 + 0.5 * rate * step)

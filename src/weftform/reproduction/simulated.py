@@ -370,39 +370,21 @@ def convergence_items(results: Results) -> list[Item]:
         items += [
             Item(
                 section,
-                f"{what}: largest shear angle (deg)",
+                f"{what}: {quantity}",
                 "shipped study",
-                base["shear_angle_deg"]["max"],
-                found["shear_angle_deg"]["max"],
-                1.0,
+                base[table][key],
+                found[table][key],
+                most,
                 absolute=True,
-            ),
-            Item(
-                section,
-                f"{what}: draw-in on the x axis (mm)",
-                "shipped study",
-                base["draw_in_mm"]["edge_x"],
-                found["draw_in_mm"]["edge_x"],
-                0.3,
-                absolute=True,
-            ),
-            Item(
-                section,
-                f"{what}: draw-in at the corner (mm)",
-                "shipped study",
-                base["draw_in_mm"]["corner"],
-                found["draw_in_mm"]["corner"],
-                0.3,
-                absolute=True,
-            ),
-            Item(
-                section,
-                f"{what}: punch force at 30 mm (N)",
-                "shipped study",
-                base["punch_force_N"],
-                found["punch_force_N"],
-            ),
+            )
+            for quantity, table, key, most in (
+                ("largest shear angle (deg)", "shear_angle_deg", "max", 1.0),
+                ("draw-in on the x axis (mm)", "draw_in_mm", "edge_x", 0.3),
+                ("draw-in at the corner (mm)", "draw_in_mm", "corner", 0.3),
+            )
         ]
+        force = base["punch_force_N"], found["punch_force_N"]
+        items.append(Item(section, f"{what}: punch force at 30 mm (N)", "shipped study", *force))
     points = [(float(u), float(v)) for u in range(0, 73, 8) for v in range(0, 73, 8)]
     quarter, full = (
         np.array([point.shear_angle_deg for point in results[run].probe(points)])

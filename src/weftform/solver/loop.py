@@ -17,7 +17,7 @@ import numba
 import numpy as np
 
 from weftform.mechanics.compiled import FASTMATH
-from weftform.mechanics.motion import motion_value
+from weftform.mechanics.motion import motion_value, pushed_velocity
 from weftform.solver import layout as at
 from weftform.solver.contact_rows import contact_row, face_row
 from weftform.solver.layout import Layout
@@ -206,9 +206,7 @@ def _move_tools(
             drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time)
             rate = tool_table[k, T_DAMPING]
             old = poses[k, P_VELOCITY]
-            new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
-                1.0 + 0.5 * rate * mean_step
-            )
+            new = pushed_velocity(old, drive - total, mass, rate, mean_step)
             poses[k, P_DAMPED] += 0.25 * rate * mass * (old + new) * (old + new) * mean_step
             poses[k, P_VELOCITY] = new
             ahead = z + step * new

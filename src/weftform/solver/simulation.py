@@ -113,7 +113,8 @@ class Simulation:
 
         They act on the initial length, so they grow with the square of the stretch; that much they are made weaker.
         """
-        stretch = 1.0 + max(self._expected[survey.WARP_STRAIN], self._expected[survey.WEFT_STRAIN], 0.0)
+        expected = self._expected
+        stretch = 1.0 + max(expected[survey.WARP_STRAIN], expected[survey.WEFT_STRAIN], 0.0)
         return float(self.problem.settings.viscosity * self.problem.grid.cell_area / stretch**2)
 
     # -- running ---------------------------------------------------------------------------------------------------
@@ -143,7 +144,7 @@ class Simulation:
             # up to the stop in batches of one size: a last one of a few steps costs as much around it as a long one
             ahead = (stop - self.time) / self.step
             with uninterrupted():
-                made = self._advance(max(1, math.ceil(ahead / max(1.0, math.ceil(ahead / most)))), stop)
+                self._advance(max(1, math.ceil(ahead / max(1.0, math.ceil(ahead / most)))), stop)
                 self._surveys += 1
                 self._before = self.last
                 self.last = self._survey()
@@ -154,8 +155,6 @@ class Simulation:
                 self._choose_step()
             if watch is not None:
                 watch(self)
-            if made == 0:
-                break
 
     def _advance(self, steps: int, stop: float) -> int:
         if self._driver is not None:

@@ -179,7 +179,7 @@ class Team:
     Attributes
     ----------
     gate
-        What :func:`meet` and :func:`next_order` need, shape [3 + members, APART] without the second axis.
+        What :func:`meet` and :func:`next_order` need, shape [(3 + members) * APART].
     """
 
     def __init__(self, members: int) -> None:
@@ -260,6 +260,7 @@ class Team:
         if self.gate[CALLED_OFF]:
             for task in self._tasks:
                 task.result()
+            raise RuntimeError("a thread left the time loop")
         return done
 
     def call_off(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from weftform.blank import YarnGrid, build_grid
-from weftform.blank.grid import LARGEST_GRID
+from weftform.blank.building import LARGEST_GRID
 from weftform.errors import StudyError
 from weftform.study.schema import BiasModel, ElementModel
 

@@ -19,6 +19,7 @@ import numba
 import numpy as np
 from numba import cuda
 
+from weftform.mechanics.motion import pushed_velocity
 from weftform.solver import layout as at
 from weftform.solver.cuda.elements import cell_forces, line_force, tool_traction
 from weftform.solver.cuda.functions import combine, device_function, dot, minus, put_vector, vector_at
@@ -67,9 +68,7 @@ def move_tool(tools, poses, k, total, planned, step, mean_step):
         drive = planned
         rate = tools[k, T_DAMPING]
         old = poses[k, P_VELOCITY]
-        new = (old * (1.0 - 0.5 * rate * mean_step) + mean_step * (drive - total) / mass) / (
-            1.0 + 0.5 * rate * mean_step
-        )
+        new = pushed_velocity(old, drive - total, mass, rate, mean_step)
         poses[k, P_DAMPED] += 0.25 * rate * mass * (old + new) * (old + new) * mean_step
         poses[k, P_VELOCITY] = new
         ahead = z + step * new
