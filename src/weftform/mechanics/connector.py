@@ -10,7 +10,6 @@ from typing import Any
 
 from weftform.mechanics.compiled import scalar
 from weftform.mechanics.piecewise import piecewise_integral, piecewise_slope, piecewise_value
-from weftform.mechanics.roots import inverse_root
 
 
 @scalar
@@ -63,12 +62,8 @@ def connector_energy(
 
 @scalar
 def connector_pull(
-    dx: float,
-    dy: float,
-    dz: float,
-    ux: float,
-    uy: float,
-    uz: float,
+    length: float,
+    rate: float,
     inverse_length: float,
     viscosity: float,
     coefficients: Any,
@@ -77,18 +72,13 @@ def connector_pull(
     width: float,
     end_slope: float,
     slack_slope: float,
-) -> tuple[float, float]:
-    """Force of a connector with its dashpot, per length of the vector between its ends, and heat of the dashpot.
+) -> tuple[float, float, float]:
+    """Force of a connector, and of its dashpot: pull [N], drag per length [N/mm] and heat [N mm/s].
 
-    ``d`` is the vector between the ends [mm], ``u`` their relative velocity [mm/s]. The force is ``f d`` with the
-    first result ``f`` [N/mm]. The dashpot acts on the initial length: force ``c (d . u) d``, heat ``c (d . u)^2``
-    [N mm/s] with ``c`` = ``viscosity`` [N s/mm3] (docs/theory/dynamics.md).
+    With ``d`` the vector between the ends [mm] and ``u`` their relative velocity [mm/s], ``rate`` is ``d . u`` [mm2/s]; the force
+    is ``(pull / length + drag) d``. The dashpot acts on the initial length: force ``c (d . u) d``, heat ``c (d . u)^2``
+    with ``c`` = ``viscosity`` [N s/mm3] (docs/theory/dynamics.md).
     """
-    squared = dx * dx + dy * dy + dz * dz
-    inverse = inverse_root(squared)
-    pull = connector_force(
-        coefficients, degree, pieces, width, end_slope, slack_slope, squared * inverse * inverse_length - 1.0
-    )
-    rate = dx * ux + dy * uy + dz * uz
+    strain = length * inverse_length - 1.0
     drag = viscosity * rate
-    return pull * inverse + drag, drag * rate
+    return connector_force(coefficients, degree, pieces, width, end_slope, slack_slope, strain), drag, drag * rate

@@ -34,6 +34,11 @@ MIRROR_Z = 11
 LANES = 8
 """Loops run over whole blocks of so many places: the widest vector unit holds eight numbers."""
 
+PIECE = 64
+"""Most cells of a row that go through its loops together: what these hand on and the rows they read fit into 48 KiB."""
+BETWEEN = 11
+"""Rows of scratch in which they hand it on, each of PIECE numbers (:mod:`weftform.solver.fabric_rows`)."""
+
 LEAD = 16
 """Unused numbers before each scratch row, so that index i - 1 exists and rows stay aligned."""
 

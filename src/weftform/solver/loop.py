@@ -19,9 +19,10 @@ import numpy as np
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.motion import motion_value, pushed_velocity
 from weftform.solver import layout as at
-from weftform.solver.contact_rows import contact_row, face_row
+from weftform.solver.contact_rows import face_row, friction_row, normal_row, radius_row, trial_row
+from weftform.solver.fabric_rows import even_piece, invert_row, measure_row, pull_row, stress_row, tension_row, warp_row
 from weftform.solver.layout import Layout
-from weftform.solver.rows import carry_row, fabric_row, update_row, warp_row
+from weftform.solver.rows import LEAD, carry_row, sum_row, update_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
 from weftform.solver.survey import ON_FACE
 from weftform.solver.team import meet, next_order
@@ -116,7 +117,7 @@ def _drive_work(state, nodes, driven_state, held, stride, force_field, step):
 
 @loop_part
 def _sweep_band(
-    state, traits, trait_rows, band, bands, first, last, spans, edge, node, membrane, series,
+    state, traits, trait_rows, band, bands, first, last, spans, edge, node, between, membrane, series,
     warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
     tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep, damping, viscosity,
     stride, row_length, trait_length, block, tools, half_cells, driven, force_field,
@@ -130,6 +131,8 @@ def _sweep_band(
     kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of
     damping and of friction with each tool.
     """
+    axial = LEAD + 2 * block + stride
+    slipped = axial + stride
     for k in range(block):
         edge[block + k] = 0.0
         node[block + k] = 0.0
@@ -145,31 +148,53 @@ def _sweep_band(
                 for m in range(pieces[k, r, 0, 0]):
                     begin = pieces[k, r, m + 1, 0]
                     place = row + np.uint64(begin)
+                    there = trait + np.uint64(begin)
                     held = np.uint64((r * tools + k) * (3 * stride) + begin)
                     count = np.uint64(pieces[k, r, m + 1, 1])
                     if pieces[k, r, m + 1, 2] == ON_FACE:
-                        axial, slipped = face_row(
-                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
-                            tool_table[k], poses[k, P_Z], last_step,
+                        face_row(
+                            state, place, traits, there, grip, held, count, node[begin:], stride, tool_table[k],
+                            poses[k, P_Z], last_step,
                         )  # fmt: skip
                     else:
-                        axial, slipped = contact_row(
-                            state, place, traits, trait + np.uint64(begin), grip, held, count, node[begin:], stride,
-                            tool_table[k], poses[k, P_Z], poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
+                        radius_row(state, place, count, between, stride)
+                        normal_row(state, place, count, between, stride, tool_table[k], poses[k, P_Z])
+                        trial_row(
+                            state, place, grip, held, count, between, stride, tool_table[k],
+                            poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
                         )  # fmt: skip
-                    reaction += axial
-                    heat += slipped
+                        friction_row(
+                            state, place, traits, there, grip, held, count, between, node[begin:], stride, tool_table[k]
+                        )
+                    reaction += sum_row(node[begin:], np.uint64(axial), count)
+                    heat += sum_row(node[begin:], np.uint64(slipped), count)
                 reactions[k, r] = reaction
                 heats[r, 1 + k] += heat
         if r < last:
             begin = spans[r, 4]
-            fabric_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 5]),
-                edge[begin:], node[begin:], stride, row_length, half_cells, membrane, series,
-                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law,
-                weft_inverse, viscosity * weft_inverse * weft_inverse, weft_degree, weft_pieces, weft_law,
-                shear_degree, shear_pieces, shear_law, ends,
-            )  # fmt: skip
+            end = begin + spans[r, 5]
+            piece = even_piece(spans[r, 5])
+            while begin < end:
+                place = row + np.uint64(begin)
+                there = trait + np.uint64(begin)
+                count = np.uint64(min(piece, end - begin))
+                measure_row(
+                    state, place, traits, there, count, between, stride, row_length, half_cells, membrane
+                )  # fmt: skip
+                invert_row(count, between)
+                stress_row(
+                    traits, there, count, between, stride, membrane, series, shear_degree, shear_pieces, shear_law, ends[2]
+                )  # fmt: skip
+                tension_row(
+                    traits, there, count, between, node[begin:], stride,
+                    warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law,
+                    weft_inverse, viscosity * weft_inverse * weft_inverse, weft_degree, weft_pieces, weft_law, ends,
+                )  # fmt: skip
+                pull_row(
+                    state, place, traits, there, count, between, edge[begin:], node[begin:], stride, row_length, half_cells,
+                    membrane,
+                )  # fmt: skip
+                begin += piece
         else:
             begin = spans[r, 2]
             warp_row(
@@ -238,7 +263,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
     shear_degree, shear_pieces = layout.shear_degree, layout.shear_pieces
 
     def advance(
-        state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, membrane, series,
+        state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, between, membrane, series,
         warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
         tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramp,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, batch, alpha, density,
@@ -252,7 +277,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
         environment = flush_subnormals()
         bands = bounds.shape[0]
         first, last = bounds[band, 0], bounds[band, 1]
-        own_edge, own_node = edge[band], node[band]
+        own_edge, own_node, own_between = edge[band], node[band], between[band]
         amplitude = np.zeros(mode_motion.shape[0])
         done = 0
         while True:
@@ -284,7 +309,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
                 meet(gate, bands)
                 _sweep_band(
                     state, traits, trait_rows, band, bands, first, last, spans, own_edge,
-                    own_node, membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
+                    own_node, own_between, membrane, series, warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
                     tool_table, poses, pieces, grip, reactions, heats, step, last_step, kick, keep,
                     0.25 * alpha * density * inertia * mean_step,
                     viscous * density * inertia / step,

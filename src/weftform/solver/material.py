@@ -35,7 +35,7 @@ class Material:
     shapes
         Degree and pieces of each.
     membrane
-        Scalars of the cells, see :func:`weftform.solver.rows.cell_row`.
+        Scalars of the cells, see :func:`weftform.solver.fabric_rows.measure_row`.
     series
         Of the logarithm.
     """

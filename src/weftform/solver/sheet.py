@@ -64,7 +64,7 @@ class Sheet:
         Local rows that are copies, and of which.
     spans
         Of each local row (:func:`weftform.solver.spans.row_spans`).
-    edge, node
+    edge, node, between
         Scratch of each band.
     """
 
@@ -80,6 +80,7 @@ class Sheet:
         self.spans: Ints = self._spread(row_spans(grid.active))
         self.edge = aligned((self.bands, layout.edge_scratch))
         self.node = aligned((self.bands, layout.node_scratch))
+        self.between = aligned((self.bands, at.BETWEEN * at.PIECE))
 
     def _lay_out_bands(self, edges: Ints) -> None:
         bands = self.bands

@@ -167,8 +167,8 @@ class Simulation:
         return int(
             self._loop(
                 sheet.state.reshape(-1), sheet.traits.reshape(-1), sheet.trait_rows, sheet.bounds, sheet.halo_to,
-                sheet.halo_from, sheet.spans, sheet.edge, sheet.node, tuple(material.membrane), tuple(material.series),
-                *material.loop_laws, material.ends, material.warp_inverse, material.weft_inverse,
+                sheet.halo_from, sheet.spans, sheet.edge, sheet.node, sheet.between, tuple(material.membrane),
+                tuple(material.series), *material.loop_laws, material.ends, material.warp_inverse, material.weft_inverse,
                 machine.tools, machine.poses, machine.pieces, machine.grip.reshape(-1), machine.reactions, machine.heats,
                 machine.times, machine.values, machine.knots, self.problem.settings.ramp,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,

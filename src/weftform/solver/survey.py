@@ -200,7 +200,7 @@ def survey(
                 kind = CLEAR
                 if nearest < way:
                     kind = ON_FACE if innermost > way else TOUCHING
-                if kind != CLEAR and kind == former:
+                if kind != CLEAR and kind == former and pieces[k, r, found, 1] < at.PIECE:
                     pieces[k, r, found, 1] += at.LANES
                 elif kind != CLEAR:
                     found += 1

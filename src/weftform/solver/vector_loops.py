@@ -61,3 +61,10 @@ def row_loop(function: Callable[..., Any]) -> Any:
     both act on the function in which they stand, and distances between fields have to be constants already there.
     """
     return numba.njit(fastmath=FASTMATH, error_model="numpy", forceinline=True, pipeline_class=SeparateArrays)(function)
+
+
+def row_sum(function: Callable[..., Any]) -> Any:
+    """Compile a sum over one row, like :func:`row_loop`; the compiler may choose the order of the additions (once and for all)."""
+    njit: Any = numba.njit
+    fastmath = FASTMATH | {"reassoc"}
+    return njit(fastmath=fastmath, error_model="numpy", forceinline=True, pipeline_class=SeparateArrays)(function)

@@ -1,6 +1,6 @@
 """Forces of the elements on the device: connector, cell, contact. Tuples of three are vectors.
 
-The same equations as the row loops of the processor (:mod:`weftform.solver.rows`,
+The same equations as the row loops of the processor (:mod:`weftform.solver.fabric_rows`,
 :mod:`weftform.solver.contact_rows`), each by the scalar functions of :mod:`weftform.mechanics`; a thread has one
 element, so nothing is arranged for vector units here.
 """
@@ -34,11 +34,12 @@ def line_force(way, rate, weight, inverse_length, viscosity, law):
     -------
     Force on the start [N], a vector, and heat [mJ/s].
     """
-    pull, heat = connector_pull(
-        way[0], way[1], way[2], rate[0], rate[1], rate[2], inverse_length, viscosity,
-        law[0], law[1], law[2], law[3], law[4], law[5],
-    )  # fmt: skip
-    f = weight * pull
+    squared = dot(way, way)
+    inverse = inverse_root(squared)
+    pull, drag, heat = connector_pull(
+        squared * inverse, dot(way, rate), inverse_length, viscosity, law[0], law[1], law[2], law[3], law[4], law[5]
+    )
+    f = weight * (pull * inverse + drag)
     return (f * way[0], f * way[1], f * way[2]), weight * heat
 
 
