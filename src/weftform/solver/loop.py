@@ -1,8 +1,8 @@
 """The time loop: many steps of central differences per call, one sweep over the rows of the grid per step.
 
-Order within a sweep, for each row: contact, then its warp connectors with the cells and weft connectors above, then
-the update. A row is updated in place as soon as the cells above it are done. Threads take bands of rows and stay in the loop;
-a band holds copies of its neighbours' edge rows (halos), refreshed before each step while all wait for each other
+Order within a sweep, for each row: contact, then piece by piece its warp connectors with the cells and weft connectors above
+and the update. Crossings are updated in place as soon as the cells around them are done. Threads take bands of rows and stay in
+the loop; a band holds copies of its neighbours' edge rows (halos), refreshed before each step while all wait for each other
 (:mod:`weftform.solver.team`), so no thread reads what another writes, and every row is computed by the same operations in
 the same order whatever the number of bands.
 """
@@ -170,17 +170,16 @@ def _sweep_band(
                     heat += sum_row(node[begin:], np.uint64(slipped), count)
                 reactions[k, r] = reaction
                 heats[r, 1 + k] += heat
-        if r < last:
-            begin = spans[r, 4]
-            end = begin + spans[r, 5]
-            piece = even_piece(spans[r, 5])
-            while begin < end:
-                place = row + np.uint64(begin)
-                there = trait + np.uint64(begin)
-                count = np.uint64(min(piece, end - begin))
-                measure_row(
-                    state, place, traits, there, count, between, stride, row_length, half_cells, membrane
-                )  # fmt: skip
+        begin, length = (spans[r, 4], spans[r, 5]) if r < last else (spans[r, 2], spans[r, 3])
+        end = begin + length
+        piece = even_piece(length)
+        while begin < end:
+            ahead = min(begin + piece, end)
+            place = row + np.uint64(begin)
+            there = trait + np.uint64(begin)
+            count = np.uint64(ahead - begin)
+            if r < last:
+                measure_row(state, place, traits, there, count, between, stride, row_length, half_cells, membrane)
                 invert_row(count, between)
                 stress_row(
                     traits, there, count, between, stride, membrane, series, shear_degree, shear_pieces, shear_law, ends[2]
@@ -194,22 +193,22 @@ def _sweep_band(
                     state, place, traits, there, count, between, edge[begin:], node[begin:], stride, row_length, half_cells,
                     membrane,
                 )  # fmt: skip
-                begin += piece
-        else:
-            begin = spans[r, 2]
-            warp_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
-                edge[begin:], node[begin:], stride,
-                warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
-            )  # fmt: skip
-        begin = spans[r, 2]
-        if r >= own_first:
-            heats[r, 0] += update_row(
-                state, row + np.uint64(begin), traits, trait + np.uint64(begin), np.uint64(spans[r, 3]),
-                edge[begin:], node[begin:], stride, step, kick, keep, damping, driven, force_field,
-            )  # fmt: skip
-        else:
-            carry_row(np.uint64(spans[r, 3]), edge[begin:], node[begin:], stride)
+            else:
+                warp_row(
+                    state, place, traits, there, count, edge[begin:], node[begin:], stride,
+                    warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
+                )  # fmt: skip
+            # the crossings of the piece have all their forces now, and no cell of a later piece starts from them
+            begin = max(begin, spans[r, 2])
+            count = np.uint64(max(min(ahead, spans[r, 2] + spans[r, 3]) - begin, 0))
+            if r >= own_first:
+                heats[r, 0] += update_row(
+                    state, row + np.uint64(begin), traits, trait + np.uint64(begin), count, edge[begin:], node[begin:],
+                    stride, step, kick, keep, damping, driven, force_field,
+                )  # fmt: skip
+            else:
+                carry_row(count, edge[begin:], node[begin:], stride)
+            begin = ahead
 
 
 @loop_part
