@@ -102,9 +102,9 @@ def test_cells_and_connectors(problem, cells):
     def stress(traits, trait, count, between, membrane, series, shear, ends):
         fabric_rows.stress_row(traits, trait, count, between, stride, membrane, series, sd, sp, shear, ends[2])
 
-    def tension(traits, trait, count, between, node, warp, weft, ends):
+    def tension(traits, trait, count, between, warp, weft, ends):
         fabric_rows.tension_row(
-            traits, trait, count, between, node, stride, 0.3, 1e-6, wd, wp, warp, 0.3, 1e-6, fd, fp, weft, ends
+            traits, trait, count, between, stride, 0.3, 1e-6, wd, wp, warp, 0.3, 1e-6, fd, fp, weft, ends
         )
 
     def pull(state, row, traits, trait, count, between, edge, node, membrane):
@@ -122,7 +122,7 @@ def test_cells_and_connectors(problem, cells):
     roots, quotients, others = found(vector_loop(stress, traits, trait, count, between, membrane, series, shear, ends))
     assert (roots, quotients) == (0, 0)
     assert others > 45
-    roots, quotients, others = found(vector_loop(tension, traits, trait, count, between, node, warp, weft, ends))
+    roots, quotients, others = found(vector_loop(tension, traits, trait, count, between, warp, weft, ends))
     assert (roots, quotients) == (0, 1)
     assert others > 30
     roots, quotients, others = found(vector_loop(pull, state, row, traits, trait, count, between, edge, node, membrane))
@@ -147,13 +147,6 @@ def test_last_row(problem):
     assert len(operations(body, "(mul|add|sub|fn?m)")) > 25
 
 
-def test_sums(problem):
-    def kernel(values, first, count):
-        return rows.sum_row(values, first, count)
-
-    assert len(operations(vector_loop(kernel, problem.sheet.node[0], np.uint64(16), np.uint64(64)), "add")) >= 1
-
-
 def test_crossings(problem):
     layout, sheet = problem.layout, problem.sheet
     stride, driven, force = layout.stride, layout.driven, layout.force
@@ -168,7 +161,7 @@ def test_crossings(problem):
     assert len(operations(body, "(mul|add|sub|fn?m)")) > 25
 
 
-@pytest.mark.parametrize("how", ["face", "radius", "normal", "trial", "friction"])
+@pytest.mark.parametrize("how", ["face", "normal", "friction"])
 def test_contact(problem, how):
     layout, sheet, machine = problem.layout, problem.sheet, problem.machine
     stride = layout.stride
@@ -178,23 +171,15 @@ def test_contact(problem, how):
     def face(state, row, traits, trait, grip, held, count, node, tool):
         contact_rows.face_row(state, row, traits, trait, grip, held, count, node, stride, tool, 0.0, 1e-6)
 
-    def radius(state, row, count, between):
-        contact_rows.radius_row(state, row, count, between, stride)
-
     def normal(state, row, count, between, tool):
         contact_rows.normal_row(state, row, count, between, stride, tool, 0.0)
 
-    def trial(state, row, grip, held, count, between, tool):
-        contact_rows.trial_row(state, row, grip, held, count, between, stride, tool, 0.0, 1e-6)
-
     def friction(state, row, traits, trait, grip, held, count, between, node, tool):
-        contact_rows.friction_row(state, row, traits, trait, grip, held, count, between, node, stride, tool)
+        contact_rows.friction_row(state, row, traits, trait, grip, held, count, between, node, stride, tool, 0.0, 1e-6)
 
     kernel, arguments, least = {
         "face": (face, (state, row, traits, trait, grip, held, count, node, tool), 20),
-        "radius": (radius, (state, row, count, between), 10),
-        "normal": (normal, (state, row, count, between, tool), 15),
-        "trial": (trial, (state, row, grip, held, count, between, tool), 10),
+        "normal": (normal, (state, row, count, between, tool), 25),
         "friction": (friction, (state, row, traits, trait, grip, held, count, between, node, tool), 20),
     }[how]
     body = vector_loop(kernel, *arguments)

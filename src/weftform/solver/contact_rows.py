@@ -1,10 +1,9 @@
 """The loops over a piece of a row that lies against a rigid tool: penalty contact and Coulomb friction.
 
 All work in tractions (force per area of fabric, MPa), so that stiffness and its inverse are constants of the tool:
-the traction of a crossing times its area is its force. Written like the loops of :mod:`weftform.solver.rows`, and cut where a
-chain of operations would become too long, for the reason given in :mod:`weftform.solver.fabric_rows`: against the rounded edge of
-a tool :func:`radius_row`, :func:`normal_row` and :func:`friction_row` have one root each, and :func:`trial_row` has none. A piece
-is at most ``layout.PIECE`` long.
+the traction of a crossing times its area is its force. Written like the loops of :mod:`weftform.solver.rows`, and against the
+rounded edge of a tool cut in two, :func:`normal_row` and :func:`friction_row`, for the reason given in
+:mod:`weftform.solver.fabric_rows`. A piece is at most ``layout.PIECE`` long.
 
 ``tool`` = (side_s, s0, side_z, z0, radius, half thickness, stiffness per area, friction, tangential ratio).
 """
@@ -18,14 +17,13 @@ from weftform.mechanics.contact import coulomb, rounded_edge
 from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
 from weftform.solver.rows import LEAD
-from weftform.solver.vector_loops import row_loop, use_full_width
+from weftform.solver.vector_loops import add_lanes, row_loop, use_full_width
 
 SMALL = 1.0e-24
 """Square of a distance from the axis [mm2] below which there is no radial direction."""
 
 S = np.uint64(at.PIECE)
-INVERSE, AWAY = np.uint64(0), S
-RADIAL, AXIAL, PRESS = INVERSE, AWAY, 2 * S
+RADIAL, AXIAL, PRESS = np.uint64(0), S, 2 * S
 """Rows of scratch ``between``."""
 
 
@@ -33,7 +31,7 @@ RADIAL, AXIAL, PRESS = INVERSE, AWAY, 2 * S
 def face_row(state, row, traits, trait, grip, held, count, node, stride, tool, tool_z, step):
     """Contact of crossings that lie against the flat face of a tool, where the normal is the axis.
 
-    The axial component of the friction traction is zero there and stays so. Leaves what :func:`friction_row` leaves.
+    The axial component of the friction traction is zero there and stays so. Returns what :func:`friction_row` returns.
     """
     use_full_width()
     numba.literally(stride)
@@ -44,8 +42,7 @@ def face_row(state, row, traits, trait, grip, held, count, node, stride, tool, t
     area = trait + s * np.uint64(at.AREA)
     tx, ty = held, held + s
     force = LEAD + s + s + s + LEAD + LEAD
-    axial = force + s + s + s + LEAD + LEAD + s
-    heat = axial + s
+    axial, heat = 0.0, 0.0
     side, z0, radius = tool[2], tool[3], tool[4]
     half_thickness, stiffness, friction, ratio = tool[5], tool[6], tool[7], tool[8]
     drag = ratio * stiffness * step
@@ -62,23 +59,9 @@ def face_row(state, row, traits, trait, grip, held, count, node, stride, tool, t
         node[force + s + i] += a * fy
         total = a * (press * side)
         node[force + s + s + i] += total
-        node[axial + i] = total
-        node[heat + i] = a * slipped
-
-
-@row_loop
-def radius_row(state, row, count, between, stride):
-    """Distance of crossings from the axis, and one over it."""
-    use_full_width()
-    numba.literally(stride)
-    s = np.uint64(stride)
-    x, y = row, row + s
-    for i in range(count):
-        px, py = state[x + i], state[y + i]
-        squared = px * px + py * py
-        inverse = inverse_root(max(squared, SMALL))
-        between[INVERSE + i] = inverse
-        between[AWAY + i] = squared * inverse
+        axial = add_lanes(axial, total)
+        heat = add_lanes(heat, a * slipped)
+    return axial, heat
 
 
 @row_loop
@@ -90,70 +73,56 @@ def normal_row(state, row, count, between, stride, tool, tool_z):
     z = row + s + s
     side_s, s0, side_z, z0, radius = tool[0], tool[1], tool[2], tool[3], tool[4]
     half_thickness, stiffness = tool[5], tool[6]
+    x, y = row, row + s
     for i in range(count):
+        px, py = state[x + i], state[y + i]
+        squared = px * px + py * py
+        inverse = inverse_root(max(squared, SMALL))
         distance, normal_s, normal_z = rounded_edge(
-            between[AWAY + i], state[z + i] - tool_z, side_s, s0, side_z, z0, radius
+            squared * inverse, state[z + i] - tool_z, side_s, s0, side_z, z0, radius
         )
-        between[RADIAL + i] = normal_s * between[INVERSE + i]
+        between[RADIAL + i] = normal_s * inverse
         between[AXIAL + i] = normal_z
         between[PRESS + i] = stiffness * max(half_thickness - distance, 0.0)
 
 
 @row_loop
-def trial_row(state, row, grip, held, count, between, stride, tool, tool_step, step):
-    """Friction traction that would be if nothing slipped: a tangential spring, of which only the tangential part is kept.
+def friction_row(state, row, traits, trait, grip, held, count, between, node, stride, tool, tool_step, step):
+    """Coulomb friction under the pressure that :func:`normal_row` found; adds the force of the tool to that on the crossings.
 
-    So it turns with the surface. ``tool_step`` is the way of the tool and ``step`` the time since the last evaluation.
+    The friction traction is a tangential spring, cut to the Coulomb limit; only its tangential part is kept (in ``grip``), so
+    it turns with the surface. ``tool_step`` is the way of the tool and ``step`` the time since the last evaluation. Returns the
+    axial force on the fabric [N] and the friction heat of the step times the tangential stiffness per area.
     """
     use_full_width()
     numba.literally(stride)
     s = np.uint64(stride)
     x, y, z = row, row + s, row + s + s
     vx, vy, vz = z + s, z + s + s, z + s + s + s
+    area = trait + s * np.uint64(at.AREA)
     tx, ty, tz = held, held + s, held + s + s
-    spring = tool[8] * tool[6]
-    drag = spring * step
-    towed = spring * tool_step
+    force = LEAD + s + s + s + LEAD + LEAD
+    axial, heat = 0.0, 0.0
+    stiffness, friction, ratio = tool[6], tool[7], tool[8]
+    drag = ratio * stiffness * step
+    towed = ratio * stiffness * tool_step
     for i in range(count):
-        radial, nz = between[RADIAL + i], between[AXIAL + i]
+        radial, nz, press = between[RADIAL + i], between[AXIAL + i], between[PRESS + i]
         nx = state[x + i] * radial
         ny = state[y + i] * radial
         wx = grip[tx + i] - drag * state[vx + i]
         wy = grip[ty + i] - drag * state[vy + i]
         wz = grip[tz + i] - (drag * state[vz + i] - towed)
         along = wx * nx + wy * ny + wz * nz
-        grip[tx + i] = wx - along * nx
-        grip[ty + i] = wy - along * ny
-        grip[tz + i] = wz - along * nz
-
-
-@row_loop
-def friction_row(state, row, traits, trait, grip, held, count, between, node, stride, tool):
-    """Cut the trial friction to the Coulomb limit and add the force of the tool to that on the crossings.
-
-    Leaves the axial part of the force [N] and the friction heat of the step times the tangential stiffness per area.
-    """
-    use_full_width()
-    numba.literally(stride)
-    s = np.uint64(stride)
-    x, y = row, row + s
-    area = trait + s * np.uint64(at.AREA)
-    tx, ty, tz = held, held + s, held + s + s
-    force = LEAD + s + s + s + LEAD + LEAD
-    axial = force + s + s + s + LEAD + LEAD + s
-    heat = axial + s
-    friction = tool[7]
-    for i in range(count):
-        press = between[PRESS + i]
-        fx, fy, fz, slipped = coulomb(grip[tx + i], grip[ty + i], grip[tz + i], friction * press)
+        fx, fy, fz, slipped = coulomb(wx - along * nx, wy - along * ny, wz - along * nz, friction * press)
         grip[tx + i] = fx
         grip[ty + i] = fy
         grip[tz + i] = fz
         a = traits[area + i]
-        outward = press * between[RADIAL + i]
-        total = a * (press * between[AXIAL + i] + fz)
-        node[force + i] += a * (outward * state[x + i] + fx)
-        node[force + s + i] += a * (outward * state[y + i] + fy)
+        total = a * (press * nz + fz)
+        node[force + i] += a * (press * nx + fx)
+        node[force + s + i] += a * (press * ny + fy)
         node[force + s + s + i] += total
-        node[axial + i] = total
-        node[heat + i] = a * slipped
+        axial = add_lanes(axial, total)
+        heat = add_lanes(heat, a * slipped)
+    return axial, heat

@@ -9,7 +9,7 @@ first-level cache.
 
 Written like the loops of :mod:`weftform.solver.rows`, whose scratch they fill: ``edge`` gets the forces of the warp edges, those
 carried to the edges of the row above, and what the cells give to the weft edges on their right; ``node`` gets the weft
-edges with the share of the cells on their right, and the heat of the dashpots.
+edges with the share of the cells on their right.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from weftform.mechanics.piecewise import polynomial
 from weftform.mechanics.roots import inverse_root
 from weftform.solver import layout as at
 from weftform.solver.rows import LEAD, U1
-from weftform.solver.vector_loops import loop_part, row_loop, use_full_width
+from weftform.solver.vector_loops import add_lanes, loop_part, row_loop, use_full_width
 
 S = np.uint64(at.PIECE)
 G11, G22, G12 = np.uint64(0), S, 2 * S
@@ -164,18 +164,17 @@ def stress_row(traits, trait, count, between, stride, membrane, series, degree, 
 
 @row_loop
 def tension_row(
-    traits, trait, count, between, node, stride,
+    traits, trait, count, between, stride,
     warp_inverse, warp_viscosity, warp_degree, warp_pieces, warp_law,
     weft_inverse, weft_viscosity, weft_degree, weft_pieces, weft_law, ends,
 ):  # fmt: skip
-    """Forces of the connectors per length of the vector between their ends, and the heat of their dashpots."""
+    """Forces of the connectors per length of the vector between their ends; returns the power their dashpots take [mJ/s]."""
     use_full_width()
     numba.literally(stride)
     s = np.uint64(stride)
     warp_weight = trait + s * np.uint64(at.WARP_LINE)
     weft_weight = trait + s * np.uint64(at.WEFT_LINE)
-    block = s + s + s + LEAD + LEAD
-    heat = LEAD + block + block
+    heat = 0.0
     for i in range(count):
         length = between[WARP_LENGTH + i]
         squared = between[WEFT_SQUARED + i]
@@ -190,7 +189,8 @@ def tension_row(
         )  # fmt: skip
         between[PULL + i] = traits[warp_weight + i] * (pull / length + warp_drag)
         between[TOW + i] = traits[weft_weight + i] * (tow * inverse + weft_drag)
-        node[heat + i] = traits[warp_weight + i] * warp_heat + traits[weft_weight + i] * weft_heat
+        heat = add_lanes(heat, traits[warp_weight + i] * warp_heat + traits[weft_weight + i] * weft_heat)
+    return heat
 
 
 @row_loop
@@ -261,6 +261,8 @@ def warp_row(
 ):  # fmt: skip
     """Warp connectors of the last row of a band, plus what the cells below carried to their upper edges.
 
+    Returns the power the dashpots take [mJ/s].
+
     ``viscosity`` [N s/mm3] is that of the dashpots over the squared pitch (docs/theory/dynamics.md).
     """
     use_full_width()
@@ -274,7 +276,7 @@ def warp_row(
     upper = LEAD + block
     half = upper + block
     weft = LEAD
-    heat = half
+    heat = 0.0
     for i in range(count):
         dx = state[x + U1 + i] - state[x + i]
         dy = state[y + U1 + i] - state[y + i]
@@ -289,7 +291,7 @@ def warp_row(
             length, rate, inverse_length, viscosity, law, degree, pieces, ends[0], ends[1], ends[2]
         )
         f = traits[weight + i] * (pull / length + drag)
-        node[heat + i] = traits[weight + i] * hot
+        heat = add_lanes(heat, traits[weight + i] * hot)
         edge[warp + i] = f * dx + edge[upper + i]
         edge[warp + s + i] = f * dy + edge[upper + s + i]
         edge[warp + s + s + i] = f * dz + edge[upper + s + s + i]
@@ -299,3 +301,4 @@ def warp_row(
         edge[half + i] = 0.0
         edge[half + s + i] = 0.0
         edge[half + s + s + i] = 0.0
+    return heat

@@ -125,5 +125,5 @@ class Layout:
 
     @property
     def node_scratch(self) -> int:
-        """Numbers of scratch for crossings: weft edges, force, and four rows of heats and axial forces."""
-        return 3 * self.block + self.stride
+        """Numbers of scratch for crossings: weft edges and force."""
+        return 2 * self.block

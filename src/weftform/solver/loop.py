@@ -19,10 +19,10 @@ import numpy as np
 from weftform.mechanics.compiled import FASTMATH
 from weftform.mechanics.motion import motion_value, pushed_velocity
 from weftform.solver import layout as at
-from weftform.solver.contact_rows import face_row, friction_row, normal_row, radius_row, trial_row
+from weftform.solver.contact_rows import face_row, friction_row, normal_row
 from weftform.solver.fabric_rows import even_piece, invert_row, measure_row, pull_row, stress_row, tension_row, warp_row
 from weftform.solver.layout import Layout
-from weftform.solver.rows import LEAD, carry_row, sum_row, update_row
+from weftform.solver.rows import carry_row, update_row
 from weftform.solver.subnormals import flush_subnormals, restore_subnormals
 from weftform.solver.survey import ON_FACE
 from weftform.solver.team import meet, next_order
@@ -131,8 +131,6 @@ def _sweep_band(
     kind (:mod:`weftform.solver.survey`); ``grip`` the friction traction of each; ``heats`` sums per row the heat of
     damping and of friction with each tool.
     """
-    axial = LEAD + 2 * block + stride
-    slipped = axial + stride
     for k in range(block):
         edge[block + k] = 0.0
         node[block + k] = 0.0
@@ -152,22 +150,29 @@ def _sweep_band(
                     held = np.uint64((r * tools + k) * (3 * stride) + begin)
                     count = np.uint64(pieces[k, r, m + 1, 1])
                     if pieces[k, r, m + 1, 2] == ON_FACE:
-                        face_row(
+                        axial, slipped = face_row(
                             state, place, traits, there, grip, held, count, node[begin:], stride, tool_table[k],
                             poses[k, P_Z], last_step,
                         )  # fmt: skip
                     else:
-                        radius_row(state, place, count, between, stride)
                         normal_row(state, place, count, between, stride, tool_table[k], poses[k, P_Z])
-                        trial_row(
-                            state, place, grip, held, count, between, stride, tool_table[k],
-                            poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
-                        )  # fmt: skip
-                        friction_row(
-                            state, place, traits, there, grip, held, count, between, node[begin:], stride, tool_table[k]
+                        axial, slipped = friction_row(
+                            state,
+                            place,
+                            traits,
+                            there,
+                            grip,
+                            held,
+                            count,
+                            between,
+                            node[begin:],
+                            stride,
+                            tool_table[k],
+                            poses[k, P_Z] - poses[k, P_LAST_Z],
+                            last_step,
                         )
-                    reaction += sum_row(node[begin:], np.uint64(axial), count)
-                    heat += sum_row(node[begin:], np.uint64(slipped), count)
+                    reaction += axial
+                    heat += slipped
                 reactions[k, r] = reaction
                 heats[r, 1 + k] += heat
         begin, length = (spans[r, 4], spans[r, 5]) if r < last else (spans[r, 2], spans[r, 3])
@@ -184,8 +189,8 @@ def _sweep_band(
                 stress_row(
                     traits, there, count, between, stride, membrane, series, shear_degree, shear_pieces, shear_law, ends[2]
                 )  # fmt: skip
-                tension_row(
-                    traits, there, count, between, node[begin:], stride,
+                power = tension_row(
+                    traits, there, count, between, stride,
                     warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law,
                     weft_inverse, viscosity * weft_inverse * weft_inverse, weft_degree, weft_pieces, weft_law, ends,
                 )  # fmt: skip
@@ -194,7 +199,7 @@ def _sweep_band(
                     membrane,
                 )  # fmt: skip
             else:
-                warp_row(
+                power = warp_row(
                     state, place, traits, there, count, edge[begin:], node[begin:], stride,
                     warp_inverse, viscosity * warp_inverse * warp_inverse, warp_degree, warp_pieces, warp_law, ends[0],
                 )  # fmt: skip
@@ -202,7 +207,7 @@ def _sweep_band(
             begin = max(begin, spans[r, 2])
             count = np.uint64(max(min(ahead, spans[r, 2] + spans[r, 3]) - begin, 0))
             if r >= own_first:
-                heats[r, 0] += update_row(
+                heats[r, 0] += step * power + update_row(
                     state, row + np.uint64(begin), traits, trait + np.uint64(begin), count, edge[begin:], node[begin:],
                     stride, step, kick, keep, damping, driven, force_field,
                 )  # fmt: skip

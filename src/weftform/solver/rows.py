@@ -8,7 +8,7 @@ ends in a scalar remainder; what lies in the padding has no mass, no weight and 
 
 Scratch ``edge`` holds three blocks of three components: warp edge forces, upper-edge forces carried to the next row, and
 what the cells give to the weft edges on their right. Scratch ``node`` holds: weft edge forces (with the share of the
-cells on their right), force on the crossings, and rows of heats.
+cells on their right), and force on the crossings.
 """
 
 from __future__ import annotations
@@ -17,20 +17,10 @@ import numba
 import numpy as np
 
 from weftform.solver import layout as at
-from weftform.solver.vector_loops import row_loop, row_sum, use_full_width
+from weftform.solver.vector_loops import add_lanes, row_loop, use_full_width
 
 U1 = np.uint64(1)
 LEAD = np.uint64(at.LEAD)
-
-
-@row_sum
-def sum_row(values, first, count):
-    """Sum of ``count`` numbers of scratch, side by side in lanes: always in the same order for the same count."""
-    use_full_width()
-    total = 0.0
-    for i in range(first, first + count):
-        total += values[i]
-    return total
 
 
 @row_loop
@@ -71,9 +61,8 @@ def update_row(
     before = LEAD - U1
     weft = LEAD
     force = LEAD + s + s + s + LEAD + LEAD
-    dashpots = force + s + s + s + LEAD + LEAD
-    half = dashpots - U1
-    heat = dashpots + s
+    half = force + s + s + s + LEAD + LEAD - U1
+    heat = 0.0
     for i in range(count):
         ux = node[weft + i] + edge[half + i]
         uy = node[weft + s + i] + edge[half + s + i]
@@ -103,5 +92,5 @@ def update_row(
         mx2 = ox + nx
         my2 = oy + ny
         mz2 = oz + nz
-        node[heat + i] = damping * traits[inertia + i] * (mx2 * mx2 + my2 * my2 + mz2 * mz2) + step * node[dashpots + i]
-    return sum_row(node, heat, count)
+        heat = add_lanes(heat, traits[inertia + i] * (mx2 * mx2 + my2 * my2 + mz2 * mz2))
+    return damping * heat
