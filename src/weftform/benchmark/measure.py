@@ -96,7 +96,8 @@ class Timed:
 def arithmetic(simulation: Simulation, touching: float, on_face: float) -> dict[str, float]:
     """Operations and memory traffic of one cell in one step, for the roofline.
 
-    Counted by hand in the formulas of ``mechanics`` and ``solver.rows``: an addition, multiplication, division, root or
+    Counted by hand in the formulas of ``mechanics``, ``solver.fabric_rows``, ``solver.rows`` and
+    ``solver.contact_rows``: an addition, multiplication, division, root or
     inverse root is one, a comparison none. Bytes are those of a sheet far larger than the caches: position and
     velocity and, where a tool touches, its friction traction are read and written back; traits are shared by rows and
     stay in a cache.
@@ -108,10 +109,10 @@ def arithmetic(simulation: Simulation, touching: float, on_face: float) -> dict[
     """
     layout = simulation.layout
     terms = len(simulation.material.series)
-    connectors = 2.0 * 38.0 + 2.0 * (layout.warp_degree + layout.weft_degree)
-    cell = 111.0 + 4.0 * (terms - 1) + 2.0 * layout.shear_degree
-    crossing = 43.0
-    tools = 76.0 * touching + 29.0 * on_face
+    connectors = 2.0 * 34.0 + 2.0 * (layout.warp_degree + layout.weft_degree)
+    cell = 123.0 + 4.0 * (terms - 1) + 2.0 * layout.shear_degree
+    crossing = 40.0
+    tools = 79.0 * touching + 31.0 * on_face
     return {
         "flops_per_cell_step": connectors + cell + crossing + tools,
         "bytes_per_cell_step": 8.0 * (2.0 * 6.0 + 2.0 * 3.0 * (touching + on_face)),
