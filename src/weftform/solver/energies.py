@@ -46,10 +46,16 @@ def polynomial_row(coefficients, degree, x, out, count):
     use_full_width()
     for i in range(count):
         out[i] = coefficients[0]
-    for k in range(1, degree + 1):
+    # four powers per pass: each pass reads and writes the row
+    odd = degree % 4
+    for k in range(1, odd + 1):
         c = coefficients[k]
         for i in range(count):
             out[i] = out[i] * x[i] + c
+    for k in range(odd + 1, degree + 1, 4):
+        a, b, c, d = coefficients[k], coefficients[k + 1], coefficients[k + 2], coefficients[k + 3]
+        for i in range(count):
+            out[i] = (((out[i] * x[i] + a) * x[i] + b) * x[i] + c) * x[i] + d
 
 
 @row_loop
@@ -158,28 +164,38 @@ def shear_row(t, count, law, degree, pieces, inside, out):
 
 
 @row_loop
+def log_row(memory, field, count, stride, series, g11, g22, warp, weft, warp_before, weft_before):
+    """Logarithms of the stretches now and at the last entry (mechanics.membrane.log_stretch); one reciprocal serves four."""
+    use_full_width()
+    s = np.uint64(stride)
+    for i in range(count):
+        g1, g2 = g11[i], g22[i]
+        h1, h2 = 1.0 + memory[field + i], 1.0 + memory[field + s + i]
+        both, both_before = (g1 + 1.0) * (g2 + 1.0), (h1 + 1.0) * (h2 + 1.0)
+        inverse = 1.0 / (both * both_before)
+        new, old = inverse * both_before, inverse * both
+        y1, y2 = (g1 - 1.0) * (g2 + 1.0) * new, (g2 - 1.0) * (g1 + 1.0) * new
+        z1, z2 = (h1 - 1.0) * (h2 + 1.0) * old, (h2 - 1.0) * (h1 + 1.0) * old
+        warp[i], weft[i] = y1 * polynomial(series, y1 * y1), y2 * polynomial(series, y2 * y2)
+        warp_before[i], weft_before[i] = z1 * polynomial(series, z1 * z1), z2 * polynomial(series, z2 * z2)
+
+
+@row_loop
 def work_row(
-    memory, field, traits, volume, count, stride, warp_modulus, weft_modulus, series,
-    g11, g22, t, tau, before, tau_before, middle, tau_middle, root, total,
+    memory, field, traits, volume, count, stride, warp_modulus, weft_modulus,
+    g11, g22, t, tau, before, tau_before, middle, tau_middle, root, warp, weft, warp_before, weft_before, total,
 ):  # fmt: skip
     """Work of the membrane since the last entry, by Simpson's rule straight in (ln l1, ln l2, gamma); becomes the last.
 
-    One reciprocal serves four logarithms, another three cosines ``(1 - t^2) / (1 + t^2)``; roots by multiplications,
-    because the divider is what these loops wait for.
+    One reciprocal serves three cosines ``(1 - t^2) / (1 + t^2)``; roots by multiplications, because the divider is what
+    these loops wait for.
     """
     use_full_width()
     s = np.uint64(stride)
     for i in range(count):
         g1, g2 = g11[i], g22[i]
         h1, h2 = 1.0 + memory[field + i], 1.0 + memory[field + s + i]
-        # ln l from l^2 (mechanics.membrane.log_stretch)
-        both, both_before = (g1 + 1.0) * (g2 + 1.0), (h1 + 1.0) * (h2 + 1.0)
-        inverse = 1.0 / (both * both_before)
-        new, old = inverse * both_before, inverse * both
-        y1, y2 = (g1 - 1.0) * (g2 + 1.0) * new, (g2 - 1.0) * (g1 + 1.0) * new
-        z1, z2 = (h1 - 1.0) * (h2 + 1.0) * old, (h2 - 1.0) * (h1 + 1.0) * old
-        e1, e2 = y1 * polynomial(series, y1 * y1), y2 * polynomial(series, y2 * y2)
-        o1, o2 = z1 * polynomial(series, z1 * z1), z2 * polynomial(series, z2 * z2)
+        e1, e2, o1, o2 = warp[i], weft[i], warp_before[i], weft_before[i]
         # area ratios l1 l2 cos(gamma)
         stretched, stretched_before = g1 * g2, h1 * h2
         stretched *= inverse_root(stretched)
@@ -235,12 +251,13 @@ def enter_ledger(
     # taken out of their arrays once: each view counts its references, which takes as long as a few crossings
     sums = np.zeros((ENTRIES, stride))
     kinetic, connectors, work, hourglass, contact, closed = sums[0], sums[1], sums[2], sums[3], sums[4], sums[5]
-    scratch = np.zeros((13, stride))
+    scratch = np.zeros((17, stride))
     g11, g22, g12, root = scratch[0], scratch[1], scratch[2], scratch[3]
     t, before, middle, tau, tau_before, tau_middle = (
         scratch[4], scratch[5], scratch[6], scratch[7], scratch[8], scratch[9]
     )  # fmt: skip
     x, y, z = scratch[10], scratch[11], scratch[12]
+    warp, weft, warp_before, weft_before = scratch[13], scratch[14], scratch[15], scratch[16]
     halves = np.full(stride, 0.5)
     weights = traits if half_cells else halves
     tractions = grip.reshape(-1)
@@ -283,9 +300,10 @@ def enter_ledger(
         shear_row(t, count, shear_law, sd, sp, x, tau)
         shear_row(before, count, shear_law, sd, sp, x, tau_before)
         shear_row(middle, count, shear_law, sd, sp, x, tau_middle)
+        log_row(memory, field, count, stride, series, g11, g22, warp, weft, warp_before, weft_before)
         work_row(
-            memory, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4], series,
-            g11, g22, t, tau, before, tau_before, middle, tau_middle, root, work,
+            memory, field, traits, trait + s * np.uint64(at.VOLUME), count, stride, membrane[3], membrane[4],
+            g11, g22, t, tau, before, tau_before, middle, tau_middle, root, warp, weft, warp_before, weft_before, work,
         )  # fmt: skip
     out = np.zeros(ENTRIES)
     for k in range(ENTRIES):

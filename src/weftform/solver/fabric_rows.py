@@ -38,7 +38,7 @@ A11, A22, A12, PULL, TOW = G11, G22, G12, WARP_LENGTH, WEFT_SQUARED
 @loop_part
 def even_piece(count):
     """Cells of the pieces that a row is cut into: whole blocks of lanes, as even as can be."""
-    pieces = -(-count // at.PIECE)
+    pieces = max(1, -(-count // at.PIECE))
     return -(-count // (pieces * at.LANES)) * at.LANES
 
 
@@ -50,14 +50,41 @@ def edges_of(state, here, above, i):
 
 
 @loop_part
-def covariant(low, left, twist, edges, upper, right, own, mirror):
-    """One component of the covariant vectors of a cell, times ``edges``: weighted means of opposite edges.
+def covariant(low, left, twist, upper, right, own, mirror):
+    """One component of the covariant vectors of a half cell: means of opposite edges by the weights of the upper and the right.
 
     The other half of a cell on a plane of symmetry is its mirror image (blank.grid.mirrors).
     """
-    g1 = edges * low + upper * twist
-    g2 = edges * left + right * twist
+    g1 = low + upper * twist
+    g2 = left + right * twist
     return own * g1 + mirror * g2, own * g2 + mirror * g1
+
+
+@loop_part
+def cell_of(state, row, s, step, traits, trait, half_cells, signs, i):
+    """Geometry of the cell above and to the right of a crossing.
+
+    Returns its lower and its left edge, how far the opposite edges differ from them, the covariant vectors (with half cells the
+    means of opposite edges, else their sums), and what the lower, upper, left and right edge get of the forces on these.
+    """
+    lx, ax, hx = edges_of(state, row, row + step, i)
+    ly, ay, hy = edges_of(state, row + s, row + s + step, i)
+    lz, az, hz = edges_of(state, row + s + s, row + s + s + step, i)
+    if half_cells:
+        wl = traits[trait + s * np.uint64(at.LOWER_WEIGHT) + i]
+        wa = traits[trait + s * np.uint64(at.LEFT_WEIGHT) + i]
+        q = traits[trait + s * np.uint64(at.MIRROR) + i]
+        qz = traits[trait + s * np.uint64(at.MIRROR_Z) + i]
+        wu, wb = 1.0 - wl, 1.0 - wa
+        g1x, g2x = covariant(lx, ax, hx, wu, wb, 1.0 - q, q * signs[0])
+        g1y, g2y = covariant(ly, ay, hy, wu, wb, 1.0 - q, q * signs[1])
+        g1z, g2z = covariant(lz, az, hz, wu, wb, 1.0 - q, qz)
+    else:
+        wl, wu, wa, wb = 1.0, 1.0, 1.0, 1.0
+        g1x, g2x = 2.0 * lx + hx, 2.0 * ax + hx
+        g1y, g2y = 2.0 * ly + hy, 2.0 * ay + hy
+        g1z, g2z = 2.0 * lz + hz, 2.0 * az + hz
+    return (lx, ly, lz), (ax, ay, az), (hx, hy, hz), (g1x, g1y, g1z), (g2x, g2y, g2z), (wl, wu, wa, wb)
 
 
 @row_loop
@@ -75,27 +102,14 @@ def measure_row(state, row, traits, trait, count, between, stride, row_length, h
     numba.literally(row_length)
     s = np.uint64(stride)
     step = np.uint64(row_length)
-    x, y, z = row, row + s, row + s + s
-    vx, vy, vz = z + s, z + s + s, z + s + s + s
-    lower_weight = trait + s * np.uint64(at.LOWER_WEIGHT)
-    left_weight = trait + s * np.uint64(at.LEFT_WEIGHT)
-    mirror = trait + s * np.uint64(at.MIRROR)
-    mirror_z = trait + s * np.uint64(at.MIRROR_Z)
+    vx = row + s * np.uint64(at.VELOCITY)
+    vy, vz = vx + s, vx + s + s
     c11, c22, c12 = membrane[0], membrane[1], membrane[2]
+    signs = membrane[6], membrane[7]
     for i in range(count):
-        lx, ax, hx = edges_of(state, x, x + step, i)
-        ly, ay, hy = edges_of(state, y, y + step, i)
-        lz, az, hz = edges_of(state, z, z + step, i)
-        if half_cells:
-            wu, wb = 1.0 - traits[lower_weight + i], 1.0 - traits[left_weight + i]
-            q = traits[mirror + i]
-            g1x, g2x = covariant(lx, ax, hx, 1.0, wu, wb, 1.0 - q, q * membrane[6])
-            g1y, g2y = covariant(ly, ay, hy, 1.0, wu, wb, 1.0 - q, q * membrane[7])
-            g1z, g2z = covariant(lz, az, hz, 1.0, wu, wb, 1.0 - q, traits[mirror_z + i])
-        else:
-            g1x, g2x = 2.0 * lx + hx, 2.0 * ax + hx
-            g1y, g2y = 2.0 * ly + hy, 2.0 * ay + hy
-            g1z, g2z = 2.0 * lz + hz, 2.0 * az + hz
+        (lx, ly, lz), (ax, ay, az), _, (g1x, g1y, g1z), (g2x, g2y, g2z), _ = cell_of(
+            state, row, s, step, traits, trait, half_cells, signs, i
+        )
         between[G11 + i] = c11 * (g1x * g1x + g1y * g1y + g1z * g1z)
         between[G22 + i] = c22 * (g2x * g2x + g2y * g2y + g2z * g2z)
         between[G12 + i] = c12 * (g1x * g2x + g1y * g2y + g1z * g2z)
@@ -201,37 +215,22 @@ def pull_row(state, row, traits, trait, count, between, edge, node, stride, row_
     numba.literally(row_length)
     s = np.uint64(stride)
     step = np.uint64(row_length)
-    x, y, z = row, row + s, row + s + s
     volume = trait + s * np.uint64(at.VOLUME)
-    lower_weight = trait + s * np.uint64(at.LOWER_WEIGHT)
-    left_weight = trait + s * np.uint64(at.LEFT_WEIGHT)
-    mirror = trait + s * np.uint64(at.MIRROR)
-    mirror_z = trait + s * np.uint64(at.MIRROR_Z)
     block = s + s + s + LEAD + LEAD
     warp = LEAD
     upper = LEAD + block
     half = upper + block
     weft = LEAD
+    signs = membrane[6], membrane[7]
     for i in range(count):
-        lx, ax, hx = edges_of(state, x, x + step, i)
-        ly, ay, hy = edges_of(state, y, y + step, i)
-        lz, az, hz = edges_of(state, z, z + step, i)
+        (lx, ly, lz), (ax, ay, az), (hx, hy, hz), (g1x, g1y, g1z), (g2x, g2y, g2z), (wl, wu, wa, wb) = cell_of(
+            state, row, s, step, traits, trait, half_cells, signs, i
+        )
         a11, a22, a12 = between[A11 + i], between[A22 + i], between[A12 + i]
         pull, tow = between[PULL + i], between[TOW + i]
         k = membrane[5] * traits[volume + i]
         if half_cells:
-            wl, wa = traits[lower_weight + i], traits[left_weight + i]
-            wu, wb = 1.0 - wl, 1.0 - wa
-            q = traits[mirror + i]
-            g1x, g2x = covariant(lx, ax, hx, 1.0, wu, wb, 1.0 - q, q * membrane[6])
-            g1y, g2y = covariant(ly, ay, hy, 1.0, wu, wb, 1.0 - q, q * membrane[7])
-            g1z, g2z = covariant(lz, az, hz, 1.0, wu, wb, 1.0 - q, traits[mirror_z + i])
             k = k * (16.0 * (wl * wu) * (wa * wb))
-        else:
-            wl, wu, wa, wb = 1.0, 1.0, 1.0, 1.0
-            g1x, g2x = 2.0 * lx + hx, 2.0 * ax + hx
-            g1y, g2y = 2.0 * ly + hy, 2.0 * ay + hy
-            g1z, g2z = 2.0 * lz + hz, 2.0 * az + hz
         px = a11 * g1x + a12 * g2x
         py = a11 * g1y + a12 * g2y
         pz = a11 * g1z + a12 * g2z

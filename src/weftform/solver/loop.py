@@ -157,20 +157,9 @@ def _sweep_band(
                     else:
                         normal_row(state, place, count, between, stride, tool_table[k], poses[k, P_Z])
                         axial, slipped = friction_row(
-                            state,
-                            place,
-                            traits,
-                            there,
-                            grip,
-                            held,
-                            count,
-                            between,
-                            node[begin:],
-                            stride,
-                            tool_table[k],
-                            poses[k, P_Z] - poses[k, P_LAST_Z],
-                            last_step,
-                        )
+                            state, place, traits, there, grip, held, count, between, node[begin:], stride, tool_table[k],
+                            poses[k, P_Z] - poses[k, P_LAST_Z], last_step,
+                        )  # fmt: skip
                     reaction += axial
                     heat += slipped
                 reactions[k, r] = reaction
