@@ -6,7 +6,7 @@
 
    What it may do and the package may not: every cell is whole and every crossing is there, so cell volume and line weights are
    numbers and mass and area are one row for all; a piece of a row meets all its tools in one loop, which also moves it,
-   compiled for each way in which they can stand to it; heats are summed in registers.
+   compiled for each way in which they can stand to it.
 
    Sizes and degrees are macros: STRIDE, TOOLS (0 or 3), WARP_DEGREE, WEFT_DEGREE, SHEAR_DEGREE, SERIES, and RESTRICT
    (1: a tool is evaluated on pieces of rows that it can touch; 0: everywhere). */

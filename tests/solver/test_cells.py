@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_problems import (
     FABRIC,
+    SMOOTH,
     affine,
     all_nodes,
     bias_grid,
@@ -168,6 +169,19 @@ def test_yarns_are_slack_in_compression():
     for fabric, expected in ((FABRIC, 0.62 * 3.9 * math.log(0.98) * 4 * 2.7), (NO_MEMBRANE, 0.0)):
         _, forces = held_at(grid, affine(grid, [[0.98, 0], [0, 1]]), fabric)
         assert forces.reshape(*grid.shape, 3)[:, -1, 0].sum() == pytest.approx(expected, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("slack", [False, True])
+@pytest.mark.parametrize("other", [(2, 3), (3, 2)], ids=["warp", "weft"])
+def test_crossings_in_the_same_place_pull_nothing_on_each_other(other, slack):
+    """A connector without length has no direction; its force is none, not a quotient of zeros."""
+    patch = free(whole_grid(), FABRIC if slack else SMOOTH)
+    positions = patch.positions
+    positions[2, 2] = positions[other]
+    put(patch, positions)
+    patch._advance(3, 1.0)
+    assert np.isfinite(patch.positions).all()
+    assert np.isfinite(patch.velocities).all()
 
 
 def test_slack_ratio_gives_yarns_a_share_of_their_initial_stiffness():

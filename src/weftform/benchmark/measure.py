@@ -96,11 +96,10 @@ class Timed:
 def arithmetic(simulation: Simulation, touching: float, on_face: float) -> dict[str, float]:
     """Operations and memory traffic of one cell in one step, for the roofline.
 
-    Counted by hand in the formulas of ``mechanics``, ``solver.fabric_rows``, ``solver.rows`` and
-    ``solver.contact_rows``: an addition, multiplication, division, root or
-    inverse root is one, a comparison none. Bytes are those of a sheet far larger than the caches: position and
-    velocity and, where a tool touches, its friction traction are read and written back; traits are shared by rows and
-    stay in a cache.
+    Counted by hand in the formulas of ``mechanics``, ``solver.fabric_rows``, ``solver.rows`` and ``solver.contact_rows``: an
+    addition, multiplication, division, root or inverse root is one, a comparison none; what a loop computes again rather than
+    fetch is counted once. Bytes are those of a sheet far larger than the caches: position and velocity and, where a tool
+    touches, its friction traction are read and written back; traits are shared by rows and stay in a cache.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ What lies between the positions and the forces of a cell is one chain of roots, 
 A processor keeps about a hundred operations waiting for their inputs, fewer than one such chain has, so a loop over all of it
 waits most of the time (docs/architecture.md). Therefore five loops share the work, each short enough for the next eight cells to
 begin while the last are under way: :func:`measure_row`, :func:`invert_row`, :func:`stress_row`, :func:`tension_row`,
-:func:`pull_row`. They take ``layout.PIECE`` cells at a time and hand them on in ``between``, a block of scratch that stays in the
-first-level cache.
+:func:`pull_row`. They take at most ``layout.PIECE`` cells at a time and hand them on in ``between``, a block of scratch that
+stays in the first-level cache; where they read and write it, it is at the same place.
 
 Written like the loops of :mod:`weftform.solver.rows`, whose scratch they fill: ``edge`` gets the forces of the warp edges, those
 carried to the edges of the row above, and what the cells give to the weft edges on their right; ``node`` gets the weft
@@ -33,6 +33,9 @@ WARP_LENGTH, WEFT_SQUARED, WARP_RATE, WEFT_RATE = 3 * S, 4 * S, 5 * S, 6 * S
 Y1, Y2, TANGENT, AREA, BY_G11, BY_G22 = G11, G22, 7 * S, 8 * S, 9 * S, 10 * S
 A11, A22, A12, PULL, TOW = G11, G22, G12, WARP_LENGTH, WEFT_SQUARED
 """Rows of scratch ``between``; each loop writes over what no later one reads."""
+
+NO_LENGTH = 1.0e-300
+"""Square of a length [mm2] below which a connector has no direction, and pulls nothing."""
 
 
 @loop_part
@@ -113,7 +116,7 @@ def measure_row(state, row, traits, trait, count, between, stride, row_length, h
         between[G11 + i] = c11 * (g1x * g1x + g1y * g1y + g1z * g1z)
         between[G22 + i] = c22 * (g2x * g2x + g2y * g2y + g2z * g2z)
         between[G12 + i] = c12 * (g1x * g2x + g1y * g2y + g1z * g2z)
-        between[WARP_LENGTH + i] = math.sqrt(lx * lx + ly * ly + lz * lz)
+        between[WARP_LENGTH + i] = math.sqrt(max(lx * lx + ly * ly + lz * lz, NO_LENGTH))
         between[WEFT_SQUARED + i] = ax * ax + ay * ay + az * az
         between[WARP_RATE + i] = (
             lx * (state[vx + U1 + i] - state[vx + i])
@@ -285,7 +288,7 @@ def warp_row(
             + dy * (state[vy + U1 + i] - state[vy + i])
             + dz * (state[vz + U1 + i] - state[vz + i])
         )
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
+        length = math.sqrt(max(dx * dx + dy * dy + dz * dz, NO_LENGTH))
         pull, drag, hot = connector_pull(
             length, rate, inverse_length, viscosity, law, degree, pieces, ends[0], ends[1], ends[2]
         )

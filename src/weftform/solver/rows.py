@@ -1,8 +1,7 @@
 """The loops over one row of the yarn grid, each written so that LLVM turns it into vector code.
 
-What makes that work: all reads are from the state, all writes to scratch arrays (or the other way round), offsets
-between the fields are constants once inlined, indices are unsigned, and there is no branch in a loop body.
-Shifted reads (``i - 1``) are from another array than the one written: a load that overlaps a store of the
+What makes that work: offsets between the fields are constants once inlined, indices are unsigned, there is no branch in a loop
+body, and shifted reads (``i - 1``, ``i + 1``) are never from fields that the loop writes: a load that overlaps a store of the
 previous iteration would stop the vectoriser. Every loop runs over whole blocks of ``layout.LANES`` places, so no row
 ends in a scalar remainder; what lies in the padding has no mass, no weight and no area.
 
@@ -42,7 +41,7 @@ def carry_row(count, edge, node, stride):
 def update_row(
     state, row, traits, trait, count, edge, node, stride, step, kick, keep, damping, driven, force_field
 ):  # fmt: skip
-    """Sum of what the edges of each crossing pull with, then central differences; returns the damping heat of the row.
+    """Sum of what the edges of each crossing pull with, then central differences; returns the heat of mass damping.
 
     ``keep`` is what mass damping leaves of a velocity in a step, ``damping`` its heat per area of fabric and squared
     sum of the velocities before and after. Where crossings are driven their force is kept in the state.

@@ -65,7 +65,8 @@ def row_loop(function: Callable[..., Any]) -> Any:
 
 @numba.njit(fastmath=FASTMATH | {"reassoc"}, error_model="numpy", forceinline=True)
 def add_lanes(total: float, value: float) -> float:
-    """``total + value``, a step of a sum over a row that may be made side by side in lanes: for rows of one length always in
-    the same order.
+    """``total + value``, a step of a sum over a row that may be made side by side in lanes.
+
+    The order depends on the length of the row and the width of the vector unit, on nothing else.
     """
     return total + value
