@@ -11,7 +11,7 @@ from pathlib import Path
 
 from weftform.errors import ResultError
 from weftform.fabric import Fabric
-from weftform.reproduction import simulated
+from weftform.reproduction import hemispheres, simulated
 from weftform.reproduction.items import Item
 from weftform.reproduction.laws import law_items, misprints
 from weftform.reproduction.picture_frames import real_frame_items
@@ -144,8 +144,8 @@ def reproduce(
         *simulated.bias_items(results),
         *simulated.frame_items(results),
         *real_frame_items(results),
-        *simulated.hemisphere_items(results),
-        *simulated.convergence_items(results),
+        *hemispheres.hemisphere_items(results),
+        *hemispheres.convergence_items(results),
         *misprints(fabric),
     ]
     drawn: list[Path] = []

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 ROW_COST = 8.0
 """Crossings whose work is that of beginning and ending a row."""
-FACE_COST, EDGE_COST = 0.25, 0.6
+FACE_COST, EDGE_COST = 0.2, 0.65
 """Work of contact with the flat face and with the rounded edge of a tool, in crossings without contact: what `weftform bench`
 finds beside sheets without contact, roughly. Only how evenly threads share the work depends on these."""
 LEAST_ROWS = 2

@@ -47,12 +47,12 @@ def polynomial_row(coefficients, degree, x, out, count):
     for i in range(count):
         out[i] = coefficients[0]
     # four powers per pass: each pass reads and writes the row
-    odd = degree % 4
-    for k in range(1, odd + 1):
+    single = degree % 4
+    for k in range(1, single + 1):
         c = coefficients[k]
         for i in range(count):
             out[i] = out[i] * x[i] + c
-    for k in range(odd + 1, degree + 1, 4):
+    for k in range(single + 1, degree + 1, 4):
         a, b, c, d = coefficients[k], coefficients[k + 1], coefficients[k + 2], coefficients[k + 3]
         for i in range(count):
             out[i] = (((out[i] * x[i] + a) * x[i] + b) * x[i] + c) * x[i] + d

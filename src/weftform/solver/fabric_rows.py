@@ -20,6 +20,7 @@ import numba
 import numpy as np
 
 from weftform.mechanics.connector import connector_pull
+from weftform.mechanics.contact import TINY
 from weftform.mechanics.membrane import SMALLEST_AREA_RATIO, shear_stress
 from weftform.mechanics.piecewise import polynomial
 from weftform.mechanics.roots import inverse_root
@@ -33,9 +34,6 @@ WARP_LENGTH, WEFT_SQUARED, WARP_RATE, WEFT_RATE = 3 * S, 4 * S, 5 * S, 6 * S
 Y1, Y2, TANGENT, AREA, BY_G11, BY_G22 = G11, G22, 7 * S, 8 * S, 9 * S, 10 * S
 A11, A22, A12, PULL, TOW = G11, G22, G12, WARP_LENGTH, WEFT_SQUARED
 """Rows of scratch ``between``; each loop writes over what no later one reads."""
-
-NO_LENGTH = 1.0e-300
-"""Square of a length [mm2] below which a connector has no direction, and pulls nothing."""
 
 
 @loop_part
@@ -116,7 +114,7 @@ def measure_row(state, row, traits, trait, count, between, stride, row_length, h
         between[G11 + i] = c11 * (g1x * g1x + g1y * g1y + g1z * g1z)
         between[G22 + i] = c22 * (g2x * g2x + g2y * g2y + g2z * g2z)
         between[G12 + i] = c12 * (g1x * g2x + g1y * g2y + g1z * g2z)
-        between[WARP_LENGTH + i] = math.sqrt(max(lx * lx + ly * ly + lz * lz, NO_LENGTH))
+        between[WARP_LENGTH + i] = math.sqrt(max(lx * lx + ly * ly + lz * lz, TINY))
         between[WEFT_SQUARED + i] = ax * ax + ay * ay + az * az
         between[WARP_RATE + i] = (
             lx * (state[vx + U1 + i] - state[vx + i])
@@ -288,7 +286,7 @@ def warp_row(
             + dy * (state[vy + U1 + i] - state[vy + i])
             + dz * (state[vz + U1 + i] - state[vz + i])
         )
-        length = math.sqrt(max(dx * dx + dy * dy + dz * dz, NO_LENGTH))
+        length = math.sqrt(max(dx * dx + dy * dy + dz * dz, TINY))
         pull, drag, hot = connector_pull(
             length, rate, inverse_length, viscosity, law, degree, pieces, ends[0], ends[1], ends[2]
         )
