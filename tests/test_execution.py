@@ -17,6 +17,7 @@ from weftform.exchange.vtkhdf import Series
 from weftform.execution import COLUMNS, run
 from weftform.fabric.fabric import shipped_cards
 from weftform.result import Result
+from weftform.solver import Simulation, loop
 from weftform.study import Study
 
 SMALL = {"blank.cell_length_mm": 5.36, "output.frames": 7, "output.rows": 41}
@@ -114,7 +115,7 @@ def test_fields_file_holds_frames_whose_points_move(dome):
         moved = root["PointData/Displacement_mm"][:].reshape(7, count, 3)
         np.testing.assert_allclose(points - moved, np.tile(dome.grid.flat[dome.grid.active], (7, 1, 1)), atol=1e-12)
         top = points[..., 2].max(axis=1)
-        assert (np.diff(top) > 2.0).all()
+        np.testing.assert_allclose(top, dome.strokes, atol=0.02)  # it lies on the punch, which carries it up
         assert np.isfinite(root["CellData/ShearAngle_deg"][:]).all()
     np.testing.assert_allclose(dome.strokes[[0, -1]], [0.0, 30.0], atol=1e-6)
 
@@ -319,17 +320,23 @@ def test_nothing_to_resume_is_refused(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_run_that_blows_up_stops_and_keeps_the_last_good_output(tmp_path):
-    """A stroke of 30 mm in 0.8 ms: yarns straighten, and stiffen, within the steps between two looks at the stable
-    step."""
-    study = Study.load(
-        "hemisphere-0-90", {**SMALL, "loading.duration_s": 0.0008, "output.rows": 101, "solver.damping_per_s": 0.0}
-    )
+def test_run_that_blows_up_stops_and_keeps_the_last_good_output(tmp_path, monkeypatch):
+    """Half-way the steps become twice as long as the stable one; what came before is kept."""
+    study = Study.load("hemisphere-0-90", {**SMALL, "loading.stroke_mm": 4.0, "loading.duration_s": 0.01})
+    half = 0.5 * case_of(study).end
+    chosen = Simulation._choose_step
+
+    def too_long(simulation):
+        chosen(simulation)
+        simulation.clock[loop.C_STEP] *= 1.0 if simulation.time < half else 2.0
+
+    monkeypatch.setattr(Simulation, "_choose_step", too_long)
     out = tmp_path / "out"
     with pytest.raises(UnstableRun, match="blew up at step"):
         run(study, out)
     result = Result.open(out)
     assert "blew up" in result.summary["status"] and not result.summary["ok"]
+    assert len(result.history["time_s"]) > 20
     assert all(np.isfinite(values).all() for values in result.history.values())
     assert np.abs(result.fields().positions).max() < 200.0
     assert not (out / "checkpoint.npz").exists()

@@ -44,7 +44,7 @@ typedef struct {
     const double *times, *values; /* motions: [motions][knots] */
     const int64_t *knots;
     int64_t most_knots;
-    double ramp, time, step, last_step;
+    double ramp, end_ramp, time, step, last_step;
     double inertia_factor;       /* variable mass scaling: on all masses of the fabric */
     double damped;               /* heat of damping so far */
     double slipped[3];           /* heat of friction of each tool so far */
@@ -308,14 +308,15 @@ INLINE void crossings(Sheet *q, double *restrict row, int64_t j, int64_t begin, 
 #endif
 }
 
-static double progress(double at, double ramp)
+static double progress(double at, double ramp, double end_ramp)
 {
-    double peak = 1.0 / (1.0 - ramp);
+    double peak = 1.0 / (1.0 - 0.5 * (ramp + end_ramp));
     if (at <= 0.0) return 0.0;
     if (at >= 1.0) return 1.0;
-    double x = (at < ramp ? at : 1.0 - at) / ramp, part = peak * ramp * x * x * x * (1.0 - 0.5 * x);
+    double length = at < ramp ? ramp : end_ramp;
+    double x = (at < ramp ? at : 1.0 - at) / length, part = peak * length * x * x * x * (1.0 - 0.5 * x);
     if (at < ramp) return part;
-    if (at > 1.0 - ramp) return 1.0 - part;
+    if (at > 1.0 - end_ramp) return 1.0 - part;
     return peak * (at - 0.5 * ramp);
 }
 
@@ -324,7 +325,10 @@ static double motion(const Sheet *q, int64_t k, double time)
     const double *t = q->times + k * q->most_knots, *v = q->values + k * q->most_knots;
     if (time <= t[0]) return v[0];
     for (int64_t i = 0; i + 1 < q->knots[k]; i++)
-        if (time < t[i + 1]) return v[i] + (v[i + 1] - v[i]) * progress((time - t[i]) / (t[i + 1] - t[i]), q->ramp);
+        if (time < t[i + 1]) {
+            double share = (time - t[i]) / (t[i + 1] - t[i]);
+            return v[i] + (v[i + 1] - v[i]) * progress(share, q->ramp, q->end_ramp);
+        }
     return v[q->knots[k] - 1];
 }
 

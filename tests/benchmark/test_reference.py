@@ -19,7 +19,7 @@ SIDE = 12
 
 @pytest.fixture(scope="module")
 def source():
-    return formed_source(SIDE, 0.3)
+    return formed_source(SIDE, 0.5)
 
 
 def side_by_side(contact, source, everywhere=False):

@@ -7,61 +7,67 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from weftform.mechanics.motion import motion_value, pushed_velocity, soft_progress
+from weftform.mechanics.motion import motion_value, peak_speed, pushed_velocity, soft_progress
 
 ramps = st.floats(0.01, 0.5)
 examples = settings(deadline=None, derandomize=True, max_examples=40)
 
 
-def speed(progress, ramp, step=1e-6):
-    return (soft_progress(progress + step, ramp) - soft_progress(progress - step, ramp)) / (2 * step)
+def speed(progress, ramp, end_ramp, step=1e-6):
+    return (soft_progress(progress + step, ramp, end_ramp) - soft_progress(progress - step, ramp, end_ramp)) / (
+        2 * step
+    )
 
 
 @examples
-@given(ramps)
-def test_goes_from_nought_to_one_without_turning_back(ramp):
-    travelled = np.array([soft_progress(p, ramp) for p in np.linspace(-0.1, 1.1, 601)])
+@given(ramps, ramps)
+def test_goes_from_nought_to_one_without_turning_back(ramp, end_ramp):
+    travelled = np.array([soft_progress(p, ramp, end_ramp) for p in np.linspace(-0.1, 1.1, 601)])
     assert travelled[0] == 0.0 and travelled[-1] == 1.0
-    assert soft_progress(0.0, ramp) == 0.0 and soft_progress(1.0, ramp) == 1.0
+    assert soft_progress(0.0, ramp, end_ramp) == 0.0 and soft_progress(1.0, ramp, end_ramp) == 1.0
     # Rounding where it stands still.
     assert (np.diff(travelled) >= -1e-15).all()
 
 
 @examples
-@given(ramps, st.floats(0.0, 1.0))
-def test_second_half_mirrors_the_first(ramp, progress):
-    forth, back = soft_progress(progress, ramp), soft_progress(1.0 - progress, ramp)
+@given(ramps, ramps, st.floats(0.0, 1.0))
+def test_backwards_it_is_the_motion_with_the_ramps_exchanged(ramp, end_ramp, progress):
+    forth, back = soft_progress(progress, ramp, end_ramp), soft_progress(1.0 - progress, end_ramp, ramp)
     assert forth + back == pytest.approx(1.0, abs=1e-14)
 
 
 @examples
-@given(ramps, st.floats(0.0, 1.0))
-def test_speed_is_that_of_the_smooth_step(ramp, progress):
-    """1 / (1 - ramp) in the middle, times 3 x^2 - 2 x^3 in the ramps: so it is continuous and starts from
-    rest."""
-    x = min(progress, 1.0 - progress) / ramp
+@given(ramps, ramps, st.floats(0.0, 1.0))
+def test_speed_is_that_of_the_smooth_step(ramp, end_ramp, progress):
+    """What two ramps leave of the way in the middle, times 3 x^2 - 2 x^3 in the ramps: so it is continuous and starts
+    from rest."""
+    x = min(progress / ramp, (1.0 - progress) / end_ramp)
     share = 3 * x**2 - 2 * x**3 if x < 1.0 else 1.0
     # Central differences: rounding 1e-16 / 1e-6; the third derivative reaches 12 / 0.01^2 and jumps at the
     # joints, where the second derivative is zero on both sides, so truncation is below 1e-12 * 1e5.
-    assert speed(progress, ramp) == pytest.approx(share / (1.0 - ramp), abs=1e-6)
+    middle = 1.0 / (1.0 - ramp / 2 - end_ramp / 2)
+    assert speed(progress, ramp, end_ramp) == pytest.approx(share * middle, abs=1e-6)
+    assert peak_speed(ramp, end_ramp) == pytest.approx(middle, rel=1e-15)
 
 
 @pytest.mark.parametrize("ramp", [0.01, 0.1, 0.3, 0.5])
-def test_speed_and_acceleration_do_not_jump_at_the_joints(ramp):
-    for joint in (0.0, ramp, 1.0 - ramp, 1.0):
-        gap = 1e-4 * ramp
+@pytest.mark.parametrize("end_ramp", [0.1, 0.5])
+def test_speed_and_acceleration_do_not_jump_at_the_joints(ramp, end_ramp):
+    for joint, length in ((0.0, ramp), (ramp, ramp), (1.0 - end_ramp, end_ramp), (1.0, end_ramp)):
+        gap = 1e-4 * min(ramp, end_ramp)
+        before, after = (speed(joint + side * gap, ramp, end_ramp, gap / 10) for side in (-1, 1))
         # Over the gap 2e-4 of a ramp, from the flat end of the smooth step: 6 x^2 / 2 of the speed, x = 1e-4.
-        assert abs(speed(joint + gap, ramp, gap / 10) - speed(joint - gap, ramp, gap / 10)) < 1e-6
+        assert abs(after - before) < 1e-6
         # The acceleration is 6 x / ramp there, peak 2: below 12e-4 / ramp.
-        turn = (speed(joint + gap, ramp, gap) - speed(joint - gap, ramp, gap)) / (2 * gap)
-        assert abs(turn) < 12e-4 / ramp
+        before, after = (speed(joint + side * gap, ramp, end_ramp, gap) for side in (-1, 1))
+        assert abs(after - before) / (2 * gap) < 12e-4 / length
 
 
 TIMES, VALUES = np.array([0.0, 2.0, 3.0, 5.0]), np.array([1.0, 4.0, 4.0, -2.0])
 
 
 def value(time, ramp=0.2):
-    return motion_value(TIMES, VALUES, 4, ramp, time)
+    return motion_value(TIMES, VALUES, 4, (ramp, 0.1), time)
 
 
 def test_passes_through_its_knots_and_stays_at_the_ends():

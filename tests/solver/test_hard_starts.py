@@ -16,23 +16,28 @@ from weftform.solver.simulation import SURVEY_EVERY
 START, STROKE, DURATION = 0.002, 6.0, 0.004
 
 
-def pushed(ramp):
+def pushed(ramp, end_ramp=None):
     """A free patch that a ball below runs into; it stands still until ``START``."""
     stroke = Motion((START, START + DURATION), (0.0, STROKE))
     tools = (ball(1.0),)
     problem = Problem(
         whole_grid(12, 10), FABRIC, tools, (stroke, Motion((0.0, 1.0), (1.0, 1.0))), stroke=0, holding=1,
-        settings=Settings(ramp=ramp, mass_scaling=100.0),
+        settings=Settings(ramp=ramp, end_ramp=end_ramp, mass_scaling=100.0),
     )  # fmt: skip
     return Simulation(problem)
 
 
 @settings(max_examples=50, deadline=None)
-@given(time=st.floats(0.0, 0.03), span=st.floats(1e-6, 0.004), ramp=st.sampled_from([0.01, 0.2, 0.5]))
-def test_no_tool_goes_further_than_the_search_expects(time, span, ramp):
-    machine = pushed(ramp).machine
+@given(
+    time=st.floats(0.0, 0.03),
+    span=st.floats(1e-6, 0.004),
+    ramp=st.sampled_from([0.01, 0.2, 0.5]),
+    end_ramp=st.sampled_from([0.1, 0.5]),
+)
+def test_no_tool_goes_further_than_the_search_expects(time, span, ramp, end_ramp):
+    machine = pushed(ramp, end_ramp).machine
     times, values = np.array([START, START + DURATION]), np.array([0.0, STROKE])
-    ways = [motion_value(times, values, 2, ramp, time + share * span) for share in np.linspace(0.0, 1.0, 9)]
+    ways = [motion_value(times, values, 2, (ramp, end_ramp), time + share * span) for share in np.linspace(0.0, 1.0, 9)]
     assert np.ptp(ways) <= machine.longest_way(time, span) + 1e-12
 
 

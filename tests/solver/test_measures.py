@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_problems import FABRIC, bias_grid, free, whole_grid
 
-from weftform.result.fields import Fields
+from weftform.result.fields import STRAIN, Fields
 from weftform.solver import layout as at
 from weftform.solver import survey
 
@@ -42,7 +42,7 @@ def test_survey_finds_the_extremes(grid, seed):
     simulation, fields = disturbed(grid, seed)
     found = simulation._survey()
     warp, weft = (
-        fields._strains[direction][lines > 0.0]
+        fields._lines[direction][STRAIN][lines > 0.0]
         for direction, lines in ((True, grid.warp_lines), (False, grid.weft_lines))
     )
     assert found[survey.WARP_STRAIN] == pytest.approx(warp.max(), rel=1e-12)

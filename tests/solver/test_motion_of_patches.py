@@ -398,5 +398,5 @@ def test_driven_crossings_follow_their_motion():
     shift[..., 2] = 5.0
     simulation = driven(grid, nodes, shift, [Motion((0.0, 0.01), (0.0, 1.0))])
     simulation.advance_to(0.006)
-    expected = 5.0 * motions.motion_value(np.array([0.0, 0.01]), np.array([0.0, 1.0]), 2, 0.2, simulation.time)
+    expected = 5.0 * motions.motion_value(np.array([0.0, 0.01]), np.array([0.0, 1.0]), 2, (0.2, 0.2), simulation.time)
     np.testing.assert_allclose(simulation.positions[..., 2], expected, rtol=1e-9)

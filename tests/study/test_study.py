@@ -86,7 +86,11 @@ def test_hemisphere_is_that_of_the_paper(name):
     assert [tools[n].up for n in ("punch", "die", "blank_holder")] == [1.0, -1.0, 1.0]
     problem = case_of(study).problem()
     assert problem.motions[problem.stroke].values == (0.0, 30.0)
-    assert problem.motions[problem.stroke].times == pytest.approx((0.01, 0.115))
+    loading = study.model.loading
+    assert problem.motions[problem.stroke].times == pytest.approx(
+        (loading.closing_s, loading.closing_s + loading.duration_s)
+    )
+    assert problem.settings.ramps == (loading.ramp, loading.end_ramp)
 
 
 @pytest.mark.parametrize("name", shipped_studies())

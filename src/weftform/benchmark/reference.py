@@ -73,7 +73,7 @@ class _Sheet(ctypes.Structure):
         ),
         *((name, ctypes.c_void_p) for name in ("tools", "poses", "touching", "times", "values", "knots")),
         ("most_knots", ctypes.c_int64),
-        *((name, ctypes.c_double) for name in ("ramp", "time", "step", "last_step", "inertia_factor", "damped")),
+        *((name, ctypes.c_double) for name in ("ramp", "end_ramp", "time", "step", "last_step", "inertia_factor", "damped")),
         ("slipped", ctypes.c_double * 3),
     )  # fmt: skip
 
@@ -156,7 +156,8 @@ class Reference:
             tools=self._address(self._tool_table), poses=self._address(self._poses), touching=self._address(self._touching),
             times=self._address(machine.times), values=self._address(machine.values),
             knots=self._address(machine.knots), most_knots=machine.times.shape[1],
-            ramp=settings.ramp, time=clock[loop.C_TIME], step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP],
+            ramp=machine.ramps[0], end_ramp=machine.ramps[1], time=clock[loop.C_TIME],
+            step=clock[loop.C_STEP], last_step=clock[loop.C_LAST_STEP],
             inertia_factor=clock[loop.C_INERTIA],
         )  # fmt: skip
         self.survey()

@@ -27,7 +27,8 @@ SIDE_MM = 150.0
 SOURCE_CELLS = 56
 """Cells along a side of the blank that is formed; finer and coarser sheets take over its shape."""
 PART_OF_STROKE = 0.6
-"""How far the stroke is when the clock starts: crossings on dome, fillet and holder, some sticking, some slipping."""
+"""Share of the time of the stroke that has passed when the clock starts: crossings lie on dome, fillet and holder, some
+sticking, some slipping."""
 PART_OF_SHAPE = 0.002
 """Share of the shape that a sheet without tools starts from: a formed blank let go at once would whip about."""
 MOST_PENETRATION_MM = 2.0e-3
@@ -52,7 +53,7 @@ def sheet_problem(cells: int, contact: bool) -> Problem:
 
 @cache
 def formed_source(cells: int = SOURCE_CELLS, part: float = PART_OF_STROKE) -> Simulation:
-    """The blank formed from flat to ``part`` of the stroke."""
+    """The blank formed from flat for ``part`` of the time of the stroke."""
     study = sheet_study(cells)
     case = case_of(study)
     simulation = Simulation(case.problem())

@@ -70,11 +70,12 @@ class Case(ABC):
         """What the user should know before the study is run."""
         return []
 
-    def settings(self, ramp: float) -> Settings:
+    def settings(self, ramp: float, end_ramp: float | None = None) -> Settings:
         """Numerical settings of the study."""
         solver = self.study.model.solver
         return Settings(
             ramp=ramp,
+            end_ramp=end_ramp,
             mass_scaling=solver.mass_scaling,
             damping=solver.damping_per_s,
             viscosity=solver.viscosity,

@@ -37,7 +37,7 @@ class Forming(Case):
             motions=(stroke, Motion((0.0, max(self.begin, 1e-12)), (0.0, 1.0))),
             stroke=0,
             holding=1,
-            settings=self.settings(loading.ramp),
+            settings=self.settings(loading.ramp, loading.end_ramp),
         )
 
     @property

@@ -8,6 +8,7 @@ over). Laws compose: :class:`Scaled`, :class:`Sum`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -48,16 +49,19 @@ class PolynomialLaw:
     valid_to: float
     constant: float = 0.0
 
-    def _polynomial(self) -> np.polynomial.Polynomial:
-        return np.polynomial.Polynomial([self.constant, *self.coefficients])
+    @cached_property
+    def _polynomials(self) -> tuple[np.polynomial.Polynomial, np.polynomial.Polynomial]:
+        """The polynomial and its derivative."""
+        polynomial = np.polynomial.Polynomial([self.constant, *self.coefficients])
+        return polynomial, polynomial.deriv()
 
     def value(self, x: Floats | float) -> Floats:
-        p, d = self._polynomial(), self._polynomial().deriv()
+        p, d = self._polynomials
         inner = p(np.minimum(x, self.valid_to))
         return _straight_beyond(x, self.valid_to, inner, p(self.valid_to), d(self.valid_to))
 
     def slope(self, x: Floats | float) -> Floats:
-        return np.asarray(self._polynomial().deriv()(np.minimum(x, self.valid_to)))
+        return np.asarray(self._polynomials[1](np.minimum(x, self.valid_to)))
 
 
 @dataclass(frozen=True)

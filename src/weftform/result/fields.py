@@ -17,6 +17,9 @@ from weftform.fabric.fabric import TensionLaw
 
 Floats = NDArray[np.float64]
 
+STRAIN, FORCE = 0, 1
+"""Quantities of a line of connectors: nominal strain, and force per width [N/mm]."""
+
 
 @dataclass(frozen=True)
 class Fields:
@@ -117,8 +120,8 @@ class Fields:
             count[dj : dj + rows, di : di + columns] += known
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
-    def _lines(self, warp: bool) -> tuple[Floats, Floats]:
-        """Nominal strain and force [N] of the connectors of one direction."""
+    def _line(self, warp: bool) -> tuple[Floats, Floats]:
+        """Nominal strain and force per width [N/mm] of the connectors of one direction."""
         edges = self._warp_edges if warp else self._weft_edges
         pitch = self.grid.warp_pitch if warp else self.grid.weft_pitch
         spacing = self.grid.weft_pitch if warp else self.grid.warp_pitch
@@ -126,24 +129,20 @@ class Fields:
         strain = np.linalg.norm(edges, axis=-1) / pitch - 1.0
         line = law.line_law(spacing)
         force = line.value(np.maximum(strain, 0.0)) + law.slack_ratio * line.slope(0.0) * np.minimum(strain, 0.0)
-        return strain, force
+        return strain, force / spacing
 
     @cached_property
-    def _strains(self) -> dict[bool, Floats]:
-        return {warp: self._lines(warp)[0] for warp in (True, False)}
+    def _lines(self) -> dict[bool, tuple[Floats, Floats]]:
+        """Of warp (True) and weft."""
+        return {warp: self._line(warp) for warp in (True, False)}
 
-    @cached_property
-    def _forces_per_width(self) -> dict[bool, Floats]:
-        grid = self.grid
-        return {warp: self._lines(warp)[1] / (grid.weft_pitch if warp else grid.warp_pitch) for warp in (True, False)}
-
-    def _on_cells(self, values: dict[bool, Floats], warp: bool) -> Floats:
+    def _on_cells(self, quantity: int, warp: bool) -> Floats:
         """Mean over the connectors of a cell; on a plane of symmetry the mirror images of the other direction's count too."""
-        own = self._mean_of_edges(values[warp], warp)
+        own = self._mean_of_edges(self._lines[warp][quantity], warp)
         share = self.grid.mirrors[0]
         if not share.any():
             return own
-        return (1.0 - share) * own + share * self._mean_of_edges(values[not warp], not warp)
+        return (1.0 - share) * own + share * self._mean_of_edges(self._lines[not warp][quantity], not warp)
 
     def _mean_of_edges(self, values: Floats, warp: bool) -> Floats:
         lower, left = self.grid.edge_weights
@@ -154,22 +153,22 @@ class Fields:
     @cached_property
     def warp_strain(self) -> Floats:
         """Nominal strain of the warp yarns, mean of a cell's connectors, shape [rows - 1, columns - 1]."""
-        return self._on_cells(self._strains, True)
+        return self._on_cells(STRAIN, True)
 
     @cached_property
     def weft_strain(self) -> Floats:
         """Nominal strain of the weft yarns."""
-        return self._on_cells(self._strains, False)
+        return self._on_cells(STRAIN, False)
 
     @cached_property
     def warp_force(self) -> Floats:
         """Tension of the warp per width [N/mm], shape [rows - 1, columns - 1]."""
-        return self._on_cells(self._forces_per_width, True)
+        return self._on_cells(FORCE, True)
 
     @cached_property
     def weft_force(self) -> Floats:
         """Tension of the weft per width [N/mm]."""
-        return self._on_cells(self._forces_per_width, False)
+        return self._on_cells(FORCE, False)
 
     @cached_property
     def directions(self) -> tuple[Floats, Floats]:
@@ -193,16 +192,12 @@ class Fields:
         s1 = card.warp_modulus_MPa * np.log(_norm(g1)[..., 0])
         s2 = card.weft_modulus_MPa * np.log(_norm(g2)[..., 0])
         tau = self.fabric.shear.shear_stress(_angle(g1, g2))
-        p1 = np.cross(normal, f1)
-        p2 = -np.cross(normal, f2)
+        x1, y1, x2, y2 = (np.einsum("...i,...i", f, e) for f in (f1, f2) for e in (e_x, e_y))
         # Eq. 24: sigma12 / 2 in each of the two yarn frames, (f1, f1 turned +90) and (f2 turned -90, f2)
-        stress = (
-            s1[..., None, None] * _dyad(f1, f1)
-            + s2[..., None, None] * _dyad(f2, f2)
-            + 0.5 * tau[..., None, None] * (_dyad(f1, p1) + _dyad(p1, f1) + _dyad(p2, f2) + _dyad(f2, p2))
-        )
-        parts = [np.einsum("...i,...ij,...j", a, stress, b) for a, b in ((e_x, e_x), (e_y, e_y), (e_x, e_y))]
-        return np.stack(parts, axis=-1)
+        along_x = s1 * x1 * x1 + s2 * x2 * x2 + tau * (x2 * y2 - x1 * y1)
+        along_y = s1 * y1 * y1 + s2 * y2 * y2 + tau * (x1 * y1 - x2 * y2)
+        shear = s1 * x1 * y1 + s2 * x2 * y2 + 0.5 * tau * (x1 * x1 - y1 * y1 + y2 * y2 - x2 * x2)
+        return np.stack([along_x, along_y, shear], axis=-1)
 
     def cell_data(self) -> dict[str, Floats]:
         """Fields of the cells by the names of the result files, one row per cell that exists."""
@@ -259,10 +254,6 @@ def _angle(a: Floats, b: Floats) -> Floats:
     """Angle by which two vectors, at right angles at first, have closed [rad]."""
     aa, bb, ab = (np.einsum("...k,...k", p, q) for p, q in ((a, a), (b, b), (a, b)))
     return np.asarray(np.arctan2(ab, np.sqrt(np.maximum(aa * bb - ab * ab, 0.0))))
-
-
-def _dyad(a: Floats, b: Floats) -> Floats:
-    return a[..., :, None] * b[..., None, :]
 
 
 def _plane_axes(normal: Floats) -> tuple[Floats, Floats]:

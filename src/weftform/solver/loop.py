@@ -81,13 +81,13 @@ def _mode_amplitude(kind, value):
 
 @loop_part
 def _drive_crossings(
-    state, nodes, driven_state, held, modes, mode_motion, mode_kind, motion_times, motion_values, motion_knots, ramp,
+    state, nodes, driven_state, held, modes, mode_motion, mode_kind, motion_times, motion_values, motion_knots, ramps,
     time, share, amplitude, stride,
 ):  # fmt: skip
     """Give the driven crossings the velocity that takes them to where they belong at ``time``."""
     for m in range(mode_motion.shape[0]):
         k = mode_motion[m]
-        value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramp, time)
+        value = motion_value(motion_times[k], motion_values[k], motion_knots[k], ramps, time)
         amplitude[m] = _mode_amplitude(mode_kind[m], value)
     for n in range(nodes.shape[0]):
         for c in range(3):
@@ -207,7 +207,7 @@ def _sweep_band(
 
 @loop_part
 def _move_tools(
-    tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramp, time, step, mean_step
+    tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramps, time, step, mean_step
 ):  # fmt: skip
     """Place the tools for the next step: where their motion has them, or where force, reaction and inertia take them."""
     for k in range(tool_table.shape[0]):
@@ -221,7 +221,7 @@ def _move_tools(
         poses[k, P_REACTION] = total
         drive = total
         if mass > 0.0:
-            drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time)
+            drive = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramps, time)
             rate = tool_table[k, T_DAMPING]
             old = poses[k, P_VELOCITY]
             new = pushed_velocity(old, drive - total, mass, rate, mean_step)
@@ -229,7 +229,7 @@ def _move_tools(
             poses[k, P_VELOCITY] = new
             ahead = z + step * new
         elif motion >= 0:
-            ahead = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramp, time + step)
+            ahead = motion_value(motion_times[motion], motion_values[motion], motion_knots[motion], ramps, time + step)
         else:
             ahead = z
         poses[k, P_WORK] += 0.5 * (drive + poses[k, P_LAST_DRIVE]) * travelled
@@ -258,7 +258,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
     def advance(
         state, traits, trait_rows, bounds, halo_to, halo_from, spans, edge, node, between, membrane, series,
         warp_law, weft_law, shear_law, ends, warp_inverse, weft_inverse,
-        tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramp,
+        tool_table, poses, pieces, grip, reactions, heats, motion_times, motion_values, motion_knots, ramps,
         driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, clock, batch, alpha, density,
         gate, band, order,
     ):  # fmt: skip
@@ -290,7 +290,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
                     if band == 0:
                         _drive_crossings(
                             state, driven_nodes, driven_state, driven_held, driven_modes, mode_motion, mode_kind, motion_times,
-                            motion_values, motion_knots, ramp, time + step, 1.0 / (step * keep), amplitude, stride,
+                            motion_values, motion_knots, ramps, time + step, 1.0 / (step * keep), amplitude, stride,
                         )  # fmt: skip
                     meet(gate, bands)
                 for h in range(halo_to.shape[0]):
@@ -312,7 +312,7 @@ def compile_loop(layout: Layout) -> Callable[..., Any]:
                 meet(gate, bands)
                 if band == 0:
                     _move_tools(
-                        tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramp, time, step, mean_step
+                        tool_table, poses, reactions, motion_times, motion_values, motion_knots, ramps, time, step, mean_step
                     )  # fmt: skip
                     if driven:
                         clock[C_DRIVE_WORK] += _drive_work(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from weftform.mechanics.motion import motion_value
+from weftform.mechanics.motion import motion_value, peak_speed
 from weftform.solver import layout as at
 from weftform.solver import loop
 from weftform.solver.problem import Motion, Problem
@@ -37,7 +37,7 @@ class Machine:
     """
 
     def __init__(self, problem: Problem, sheet: Sheet) -> None:
-        self.ramp = problem.settings.ramp
+        self.ramps = problem.settings.ramps
         self._place_tools(problem)
         self.springs = self.tools[:, loop.T_STIFFNESS] * float(problem.grid.node_area.sum())
         tools = len(problem.tools)
@@ -77,7 +77,11 @@ class Machine:
             self.values[k, :n] = motion.values
             self.knots[k] = n
         self.legs = [
-            (times[:-1], times[1:], np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) / (1.0 - self.ramp))
+            (
+                times[:-1],
+                times[1:],
+                np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) * peak_speed(*self.ramps),
+            )
             for times, values in ((np.array(motion.times), np.array(motion.values)) for motion in motions)
         ]
 
@@ -125,4 +129,4 @@ class Machine:
 
     def motion(self, index: int, time: float) -> float:
         """Value of a motion at a time."""
-        return float(motion_value(self.times[index], self.values[index], self.knots[index], self.ramp, time))
+        return float(motion_value(self.times[index], self.values[index], self.knots[index], self.ramps, time))

@@ -52,6 +52,8 @@ class Settings:
     """Numerical settings; see ``study.schema.SolverTable``."""
 
     ramp: float = 0.2
+    end_ramp: float | None = None
+    """Like ``ramp`` without."""
     mass_scaling: float = 1.0
     damping: float = 0.0
     viscosity: float = 0.06
@@ -61,6 +63,11 @@ class Settings:
     least_step: float = 0.0
     """Below this step [s] the mass of the fabric is scaled up, uniformly and only as long as it takes."""
     most_steps: int = 20_000_000
+
+    @property
+    def ramps(self) -> tuple[float, float]:
+        """Shares of a motion's time in which it gathers and loses speed."""
+        return self.ramp, self.ramp if self.end_ramp is None else self.end_ramp
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ class Simulation:
                 sheet.halo_from, sheet.spans, sheet.edge, sheet.node, sheet.between, tuple(material.membrane),
                 tuple(material.series), *material.loop_laws, material.ends, material.warp_inverse, material.weft_inverse,
                 machine.tools, machine.poses, machine.pieces, machine.grip.reshape(-1), machine.reactions, machine.heats,
-                machine.times, machine.values, machine.knots, self.problem.settings.ramp,
+                machine.times, machine.values, machine.knots, machine.ramps,
                 machine.nodes, machine.driven, machine.held, machine.modes, machine.mode_motion, machine.mode_kind,
                 self.clock, self._batch, self.problem.settings.damping, self.density, self._team.gate, band, order,
             )

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from weftform.fabric.card import Declared, Finite, NotNegative, Positive
 
 Ramp = Annotated[float, Field(strict=True, gt=0, le=0.5, allow_inf_nan=False)]
-"""Share of a motion spent gathering speed, and again losing it."""
+"""Share of a motion's time spent gathering speed, and again losing it."""
 
 Coefficient = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
 
@@ -110,6 +110,8 @@ class FormingLoading(Declared):
     closing_s: NotNegative = 0.01
     duration_s: Positive
     ramp: Ramp = 0.2
+    end_ramp: Ramp | None = None
+    """Of the end; like ``ramp`` without. At the end the fabric is tight, and a short one does no harm."""
 
 
 class SolverTable(Declared):

@@ -219,7 +219,7 @@ class CudaDriver:
         One row per step and an empty one behind the last.
         """
         machine = self.machine
-        times, values, knots, ramp = machine.times, machine.values, machine.knots, machine.ramp
+        times, values, knots, ramps = machine.times, machine.values, machine.knots, machine.ramps
         step, last_step, inertia = (float(clock[c]) for c in (C_STEP, C_LAST_STEP, C_INERTIA))
         drag = viscosity * self._density * inertia / step
         rows: list[list[float]] = []
@@ -235,12 +235,12 @@ class CudaDriver:
                 motion = int(tool[T_MOTION])
                 at_time = time if tool[T_MASS] > 0.0 else time + step
                 row.append(
-                    value_of_motion(times[motion], values[motion], knots[motion], ramp, at_time)
+                    value_of_motion(times[motion], values[motion], knots[motion], ramps, at_time)
                     if motion >= 0
                     else float(machine.poses[k, P_Z])
                 )
             for mode, kind in zip(machine.mode_motion, machine.mode_kind, strict=True):
-                value = value_of_motion(times[mode], values[mode], knots[mode], ramp, time + step)
+                value = value_of_motion(times[mode], values[mode], knots[mode], ramps, time + step)
                 row.append(math.cos(value) - 1.0 if kind == COSINE else math.sin(value) if kind == SINE else value)
             rows.append(row)
             clock[C_TIME] = time + step
