@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from weftform.benchmark.bench import Bench
+from weftform.benchmark.measure import LAP_STEPS, LAP_SURVEYS
 
 TARGETS = (
     (56, True, 1, 1.1),
@@ -25,8 +26,8 @@ def page(bench: Bench, peers: list[dict[str, Any]] | None = None) -> str:
         "",
         "Made by `weftform bench --markdown`; do not edit. Nanoseconds per cell per step (one cell, two connectors, one",
         "crossing) of the shipped hemisphere on a whole blank when 60 % of the time of its stroke has passed, double precision.",
-        "A figure is the least over laps of 256 steps with two surveys, and the share of a lap in entries of the energy ledger",
-        "and rows of the history; *loop* is the same without the rows. The yardstick is the C program",
+        f"A figure is the least over laps of {LAP_STEPS} steps with {LAP_SURVEYS} surveys, and the share of a lap in entries of",
+        "the energy ledger and rows of the history; *loop* is the same without the rows. The yardstick is the C program",
         "`benchmarks/reference/sheet.c` on one thread: the same physics by hand, steps and surveys only. The laps of all cases",
         "take turns, so ratios mean more than times.",
         "",

@@ -106,8 +106,11 @@ class Fields:
         At a tip where only one connector ends it is that of the cells.
         """
         met = self._mean_at_crossings(self.corner_shear)
-        cells = self._mean_at_crossings(np.broadcast_to(self.shear_angle, (4, *self.grid.cells.shape)))
-        return np.where(np.isfinite(met), met, np.where(self.grid.active, cells, np.nan))
+        lonely = self.grid.active & np.isnan(met)
+        if lonely.any():
+            cells = self._mean_at_crossings(np.broadcast_to(self.shear_angle, (4, *self.grid.cells.shape)))
+            met[lonely] = cells[lonely]
+        return met
 
     def _mean_at_crossings(self, corners: Floats) -> Floats:
         """Mean over the corners of cells that meet at each crossing, of those that are known."""
