@@ -18,6 +18,7 @@ def found():
     return whole.bench(sides=(12,), threads=(1,), seconds=0.0, fewest=2, source_cells=12, with_start_up=False)
 
 
+@pytest.mark.slow
 def test_json_has_machine_and_cases(found):
     read = json.loads(found.to_json())
     assert set(read) == {"machine", "cases"}
@@ -27,11 +28,13 @@ def test_json_has_machine_and_cases(found):
     assert all(case["cells"] == 144 and case["threads"] == 1 and case["laps"] >= 2 for case in ours)
 
 
+@pytest.mark.slow
 def test_least_is_least_and_the_loop_is_part_of_the_whole(found):
     for case in found.cases:
         assert 0.0 < case["loop_ns_per_cell_step"] <= case["ns_per_cell_step"] <= case["median_ns_per_cell_step"]
 
 
+@pytest.mark.slow
 def test_ratios_are_to_the_reference_on_the_same_sheet(found):
     yardsticks = {case["contact"]: case["ns_per_cell_step"] for case in found.cases if case["program"] == "c-reference"}
     if not yardsticks:
@@ -41,6 +44,7 @@ def test_ratios_are_to_the_reference_on_the_same_sheet(found):
         assert case["ratio_to_c"] == pytest.approx(case["ns_per_cell_step"] / yardsticks[case["contact"]], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_page_names_every_case(found):
     text = page(found)
     assert text.count("| weftform |") >= 2
