@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from weftform.mechanics.compiled import python_function
 from weftform.mechanics.motion import motion_value, peak_speed
 from weftform.solver import layout as at
 from weftform.solver import loop
 from weftform.solver.problem import Motion, Problem
 from weftform.solver.sheet import Sheet, aligned
+
+value_of_motion = python_function(motion_value)
+"""For the calls from Python: there are few, and compiling it takes longer."""
 
 
 class Machine:
@@ -76,11 +80,12 @@ class Machine:
             self.times[k, :n] = motion.times
             self.values[k, :n] = motion.values
             self.knots[k] = n
+        peak = python_function(peak_speed)(*self.ramps)
         self.legs = [
             (
                 times[:-1],
                 times[1:],
-                np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) * peak_speed(*self.ramps),
+                np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) * peak,
             )
             for times, values in ((np.array(motion.times), np.array(motion.values)) for motion in motions)
         ]
@@ -129,4 +134,4 @@ class Machine:
 
     def motion(self, index: int, time: float) -> float:
         """Value of a motion at a time."""
-        return float(motion_value(self.times[index], self.values[index], self.knots[index], self.ramps, time))
+        return float(value_of_motion(self.times[index], self.values[index], self.knots[index], self.ramps, time))

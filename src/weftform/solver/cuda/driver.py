@@ -14,11 +14,10 @@ from numba import cuda
 from numpy.typing import NDArray
 
 from weftform.errors import DeviceError
-from weftform.mechanics.motion import motion_value
 from weftform.solver import energies, survey
 from weftform.solver import layout as at
 from weftform.solver.cuda import looking
-from weftform.solver.cuda.functions import SIMULATED, python_function
+from weftform.solver.cuda.functions import SIMULATED
 from weftform.solver.cuda.gpu import find_gpu
 from weftform.solver.cuda.launch import COMPILE_ONLY, MOVING, S_TOOLS, Constants, Tile, kept_fields, tile_for
 from weftform.solver.cuda.sweep import compile_sweep, start_driven
@@ -37,15 +36,13 @@ from weftform.solver.loop import (
     T_MASS,
     T_MOTION,
 )
-from weftform.solver.machine import Machine
+from weftform.solver.machine import Machine, value_of_motion
 from weftform.solver.material import Material
 from weftform.solver.problem import Problem
 from weftform.solver.sheet import Sheet
 
 Floats = NDArray[np.float64]
 
-value_of_motion = python_function(motion_value)
-"""Called a few times per step from Python, where calling a compiled function gains nothing over its compilation."""
 ALL_PARTS = ("moving", "kept", "grip", "heats")
 """What lives on the device, see :meth:`CudaDriver.sync`."""
 LOOKING_THREADS = 128

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from types import FunctionType
 from typing import Any
 
 import numba
 from numba import cuda
-from numba.core.dispatcher import Dispatcher
+
+from weftform.mechanics.compiled import python_function, rebuilt
 
 # a small blank does not fill a GPU; the user has asked for it all the same
 numba.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # type: ignore[attr-defined]
@@ -23,27 +23,12 @@ SIMULATED = bool(numba.config.ENABLE_CUDASIM)  # type: ignore[attr-defined]
 
 
 @cache
-def python_function(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A compiled function, and every compiled function that it calls, as they were written."""
-    return _rebuilt(function, python_function)
-
-
-@cache
 def device_function(function: Callable[..., Any]) -> Any:
     """Compile a function of numbers and tuples for the device, and every scalar function that it calls."""
     if SIMULATED:
         return python_function(function)
     jit: Any = cuda.jit
-    return jit(device=True, forceinline=True)(_rebuilt(function, device_function))
-
-
-def _rebuilt(function: Any, convert: Callable[..., Any]) -> Callable[..., Any]:
-    """A Python function whose compiled callees are converted."""
-    source = getattr(function, "py_func", function)
-    called = {name: source.__globals__[name] for name in source.__code__.co_names if name in source.__globals__}
-    replaced = {name: convert(value) for name, value in called.items() if isinstance(value, Dispatcher)}
-    scope = {**source.__globals__, **replaced}
-    return FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
+    return jit(device=True, forceinline=True)(rebuilt(function, device_function))
 
 
 # -- vectors as tuples: values in registers ---------------------------------------------------------
