@@ -10,8 +10,10 @@ import math
 import h5py
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from weftform.cases import case_of
+from weftform.cli import app
 from weftform.errors import CardError, ResultError, StudyError, UnstableRun
 from weftform.exchange.vtkhdf import Series
 from weftform.execution import COLUMNS, run
@@ -256,6 +258,18 @@ def test_interrupted_run_keeps_its_outputs_and_resumes_to_the_same_numbers(domes
     # all rows of the run that went through, and one of the interruption unless it came just at one of them
     assert np.isin(through.history["time_s"], times).all()
     assert len(times) <= 41 + 1
+
+
+def test_interrupted_while_compiling_leaves_nothing_half_written(tmp_path, monkeypatch):
+    def interrupt(simulation):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Simulation, "compile", interrupt)
+    out = tmp_path / "out"
+    said = CliRunner().invoke(app, ["run", "hemisphere-0-90", "--out", str(out)])
+    assert said.exit_code == 130
+    assert "before there was anything to keep" in said.output and "--resume" not in said.output
+    assert list(out.iterdir()) == []
 
 
 @pytest.fixture

@@ -40,5 +40,13 @@ def test_each_doubt_says_what_to_change(energy, penetration, advice):
     assert advice in doubt
 
 
+def test_mass_that_is_scaled_much_is_named_as_the_other_cause():
+    energy = {"balance_error": 0.0, "kinetic_over_internal": 84.0}
+    (doubt,) = doubts(energy, 0.0, inertia=6.3)
+    assert "solver.least_step_s" in doubt and "6.3" in doubt and "8,400 %" in doubt
+    (doubt,) = doubts(energy, 0.0, inertia=2.1)
+    assert "least_step_s" not in doubt
+
+
 def test_a_run_without_rows_has_no_energies():
     assert energy_summary([]) == {"balance_error": 0.0, "kinetic_over_internal": 0.0}

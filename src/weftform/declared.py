@@ -6,7 +6,8 @@ import difflib
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -75,6 +76,12 @@ def line_of(text: str, location: tuple[str | int, ...]) -> int | None:
 
 def known_keys(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
     """Names allowed at a place of a declared model; empty where the place cannot be resolved."""
+    table = _model_in(_declared_at(model, location))
+    return list(getattr(table, "model_fields", {}))
+
+
+def _declared_at(model: type[BaseModel], location: tuple[str | int, ...]) -> Any:
+    """What a declared model says about a place: a type, with its limits; None where the place cannot be resolved."""
     current: Any = model
     named = False
     for part in location:
@@ -84,14 +91,44 @@ def known_keys(model: type[BaseModel], location: tuple[str | int, ...]) -> list[
             # a name that the file chooses, such as that of a tool
             named = False
             continue
-        fields = getattr(current, "model_fields", None)
-        if fields is None or part not in fields:
-            return []
-        named = get_origin(fields[part].annotation) is dict
-        current = _model_in(fields[part].annotation)
-        if current is None:
-            return []
-    return list(getattr(current, "model_fields", {}))
+        fields = getattr(_model_in(current), "model_fields", {})
+        if part not in fields:
+            return None
+        found = fields[part]
+        named = get_origin(found.annotation) is dict
+        current = Annotated[(found.annotation, *found.metadata)] if found.metadata else found.annotation
+    return current
+
+
+NAMES: dict[Any, str] = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
+LIMITS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+
+
+def wanted(declared: Any) -> str | None:
+    """What a declared place takes, in words: ``a number, greater than 0 and at most 0.5``; None where words are lacking."""
+    if declared in NAMES:
+        return NAMES[declared]
+    origin, arguments = get_origin(declared), get_args(declared)
+    if origin is Annotated:
+        kind, *metadata = arguments
+        words = wanted(kind)
+        limits = [
+            f"{word} {limit}"
+            for part in metadata
+            # a pydantic Field carries its limits in a list of its own
+            for rule in getattr(part, "metadata", [part])
+            for name, word in LIMITS.items()
+            if (limit := getattr(rule, name, None)) is not None
+        ]
+        return f"{words}, {' and '.join(limits)}" if words and limits else words
+    if origin is Literal:
+        return ("one of " if len(arguments) > 1 else "") + ", ".join(str(choice) for choice in arguments)
+    if origin in (Union, UnionType):
+        choices = [choice for choice in arguments if choice is not type(None)]
+        return wanted(choices[0]) if len(choices) == 1 else None
+    if origin is None and (table := _model_in(declared)) is not None:
+        return "a table with the keys " + ", ".join(table.model_fields)
+    return None
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:
@@ -138,10 +175,13 @@ def validated(
                 hint=f"did you mean {close[0]}?" if close else None,
             ) from None
         message = first["msg"].removeprefix("Value error, ")
+        if first["type"] in ("model_type", "dict_type"):
+            message = "a table is needed here"
         raise error(
             f"{message[0].lower()}{message[1:]}{more}",
             file=file,
             line=line,
             key=key or None,
+            expected=None if first["type"] == "value_error" else wanted(_declared_at(model, location)),
             got=None if first["type"] in ("missing", "value_error") else repr(first["input"])[:200],
         ) from None

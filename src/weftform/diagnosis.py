@@ -17,22 +17,26 @@ REQUIRED = ("numpy", "scipy", "numba", "h5py", "pydantic", "typer", "rich", "mat
 
 TINY = (
     "blank.cell_length_mm=7.5",
-    "loading.stroke_mm=8",
-    "loading.duration_s=0.03",
-    "solver.damping_per_s=500",
+    "loading.stroke_mm=15",
+    "loading.duration_s=0.06",
+    "loading.closing_s=0.005",
+    "loading.ramp=0.3",
+    "loading.end_ramp=0.1",
+    "solver.damping_per_s=200",
     "solver.viscosity=0.06",
     "solver.safety=0.85",
     "output.frames=2",
     "output.rows=5",
 )
-"""Changes that make the shipped hemisphere a run of a fraction of a second."""
+"""Changes that make the shipped hemisphere a run of a fraction of a second, whatever becomes of its loading."""
 
-TINY_SHEAR_DEG = 1.2204
+TINY_SHEAR_DEG = 4.4224
 """Mean shear angle of that run. Stored from a run whose default-size sibling meets the kinematic net and the closed forms (tests);
 it is compared, not trusted: a difference means that this machine computes something else."""
 
-TINY_TOLERANCE = 1.0e-3
-"""Relative; processors round differently and friction amplifies it, to a few 1e-5 in practice."""
+TINY_TOLERANCE = 1.0e-4
+"""Relative; rounding and other batches of steps, which friction amplifies, change it by some 1e-5. (Before 10 mm of stroke the
+fabric is slack, and they change it a hundred times as much.)"""
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def _versions() -> Finding:
         "packages",
         ", ".join(found) + (f"; missing: {', '.join(missing)}" if missing else ""),
         not missing,
-        f"pip install {' '.join(missing)}",
+        f"pip install {' '.join(missing)}" if missing else "",
     )
 
 
@@ -106,15 +110,14 @@ def _gpu() -> Finding:
 
 
 def _kernel_folder() -> Finding:
-    from weftform.solver.kernel_cache import kernel_folder
+    from weftform.solver.kernel_cache import kernel_folder, user_folder
 
     folder = kernel_folder()
     kept = sum(1 for _ in folder.rglob("*.nbc"))
-    home = not str(folder).startswith(tempfile.gettempdir())
     return Finding(
         "compiled kernels",
         f"{kept} in {folder}",
-        home,
+        folder.parent == user_folder(),
         "the user's cache folder cannot be written, so kernels may be compiled again after a restart",
     )
 

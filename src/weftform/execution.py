@@ -150,16 +150,23 @@ class Run:
         study = self.study
         output = study.model.output
         case = self.case
+        self._warm_up()
         if self._resume:
             self._restore()
         else:
             write_whole(self.out / "study.toml", study.to_toml(_versions()))
-        writer = ResultWriter(self.out, self.columns, self._fields(), resume=self._resume)
+        try:
+            writer = ResultWriter(self.out, self.columns, self._fields(), resume=self._resume)
+        except OSError as problem:
+            raise ResultError(
+                f"the result cannot be opened ({problem.strerror or problem})",
+                file=self.out,
+                hint="run anew without --resume" if self._resume else "choose another with --out",
+            ) from None
         frames = np.linspace(case.begin, case.end, output.frames)
         rows = np.linspace(0.0, case.end, output.rows)
         stops = np.unique(np.concatenate([frames, rows]))
         frames_at, rows_at = set(frames.tolist()), set(rows.tolist())
-        self._warm_up()
         self._last_report = 0.0
         try:
             for stop in stops:
@@ -212,7 +219,7 @@ class Run:
         return crowding(self.simulation.bands, usable_processors(), self._processor_s, self._loop_s)
 
     def _warm_up(self) -> None:
-        """Compile, or load from the cache, before the clock starts."""
+        """Compile, or load from the cache, before the clock starts and before anything is written."""
         self.simulation.compile()
 
     def _look(self, simulation: Simulation) -> None:
@@ -301,7 +308,12 @@ class Run:
         study, grid, simulation = self.study, self.grid, self.simulation
         fields = self._last_sound
         energy = energy_summary(self.rows)
-        warnings = doubts(energy, self.peak_penetration / study.fabric.thickness, whole=status == "done")
+        warnings = doubts(
+            energy,
+            self.peak_penetration / study.fabric.thickness,
+            inertia=simulation.largest_inertia,
+            whole=status == "done",
+        )
         values: dict[str, Any] = {
             "study": study.name,
             "ok": status == "done" and not warnings,

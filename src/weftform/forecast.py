@@ -13,7 +13,7 @@ from weftform.mechanics.stable_step import stable_step
 from weftform.processors import threads_for
 from weftform.study import Study
 from weftform.study.schema import FormingModel
-from weftform.verdict import blank_summary
+from weftform.verdict import MUCH_INERTIA, blank_summary
 
 NS_PER_CELL_STEP = 30.0
 """Of one thread with three tools on a laptop of 2023; `weftform doctor` measures this machine."""
@@ -35,6 +35,8 @@ class Forecast:
     area_error: float
     first_step_s: float
     smallest_step_s: float
+    inertia: float
+    """Factor by which ``solver.least_step_s`` scales the mass then."""
     simulated_s: float
     steps: int
     threads: int
@@ -58,7 +60,8 @@ class Forecast:
                 if abs(self.area_error) > 5e-7
                 else ""
             ),
-            f"step       {self.first_step_s:.2e} s at first, about {self.smallest_step_s:.2e} s once the yarns are tight",
+            f"step       {self.first_step_s:.2e} s at first, about {self.smallest_step_s:.2e} s once the yarns are tight"
+            + (f" (mass scaled by {self.inertia:.2g})" if self.inertia > 1.0 else ""),
             f"steps      about {self.steps:,} for {self.simulated_s:.3g} s of simulated time",
             f"duration   about {self.duration_s:.1f} s with {self.threads} thread{'s' * (self.threads > 1)}"
             " (once the kernels are compiled)",
@@ -79,10 +82,15 @@ def forecast(study: Study) -> Forecast:
         weft = _tangent(fabric.weft, grid.warp_pitch, weft_strain) / grid.weft_pitch
         return model.solver.safety * stable_step(max(warp, weft), contact, mass, model.solver.viscosity)
 
-    first = step(0.0, 0.0)
-    tight = step(
+    def made(stable: float) -> float:
+        """The step that a run makes: where the stable one is shorter than the least, the mass is scaled."""
+        return max(stable, model.solver.least_step_s)
+
+    stable = step(
         _strain_at(fabric.warp, grid.weft_pitch, WORKING_FORCE), _strain_at(fabric.weft, grid.warp_pitch, WORKING_FORCE)
     )
+    first, tight = made(step(0.0, 0.0)), made(stable)
+    inertia = (tight / stable) ** 2
     time = case_of(study).end
     steps = int(0.5 * time * (1.0 / first + 1.0 / tight))
     threads = threads_for(grid.cell_count, None)
@@ -98,12 +106,13 @@ def forecast(study: Study) -> Forecast:
         area_error=float(blank["area_error"]),
         first_step_s=first,
         smallest_step_s=tight,
+        inertia=inertia,
         simulated_s=time,
         steps=steps,
         threads=threads,
         duration_s=steps * places * NS_PER_CELL_STEP * 1e-9 / threads,
         memory_MB=150.0 + places * 500e-6,
-        warnings=_warnings(study, steps, float(blank["area_error"])),
+        warnings=_warnings(study, steps, float(blank["area_error"]), inertia),
     )
 
 
@@ -118,7 +127,7 @@ def _strain_at(law: TensionLaw, spacing: float, force: float) -> float:
     return float(np.interp(force * spacing, line.value(strain), strain))
 
 
-def _warnings(study: Study, steps: int, area_error: float) -> list[str]:
+def _warnings(study: Study, steps: int, area_error: float, inertia: float) -> list[str]:
     found = case_of(study).warnings()
     model, grid = study.model, study.grid
     if isinstance(model, FormingModel):
@@ -131,6 +140,11 @@ def _warnings(study: Study, steps: int, area_error: float) -> list[str]:
             )
     if abs(area_error) > 0.01:
         found.append(f"the cells cover {100 * area_error:+.1f} % of the outline's area; smaller cells come closer")
+    if inertia > MUCH_INERTIA:
+        found.append(
+            f"solver.least_step_s scales the mass by {inertia:.2g} once the yarns are tight: kinetic energy may be too large; "
+            "lower it in proportion to the cells"
+        )
     if steps > model.solver.most_steps:
         found.append("more steps than solver.most_steps allows: the run would stop before its end")
     return found

@@ -18,8 +18,16 @@ LOADED_FROM = 0.01
 MOST_PENETRATION = 0.05
 """Largest penetration into a tool as a share of the thickness."""
 
+MUCH_INERTIA = 4.0
+"""Factor on the mass from which the least step is what makes a run dynamic."""
 
-def doubts(energy: dict[str, float], penetration: float, *, whole: bool = True) -> list[str]:
+
+def percent(share: float) -> str:
+    """A share in percent, two digits, without powers of ten."""
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:,.0f} %"
+
+
+def doubts(energy: dict[str, float], penetration: float, *, inertia: float = 1.0, whole: bool = True) -> list[str]:
     """What casts doubt on a run, with what to change.
 
     Parameters
@@ -28,6 +36,8 @@ def doubts(energy: dict[str, float], penetration: float, *, whole: bool = True) 
         From :func:`energy_summary`.
     penetration
         Largest penetration as a share of the thickness.
+    inertia
+        Largest factor by which the least step has scaled the mass.
     whole
         Whether the run came to its end. Of a part the largest internal energy is not known, by which it is judged when the
         fabric is loaded and kinetic energy counts.
@@ -35,16 +45,21 @@ def doubts(energy: dict[str, float], penetration: float, *, whole: bool = True) 
     found = []
     if energy["balance_error"] > MOST_IMBALANCE:
         found.append(
-            f"the energy ledger misses {100 * energy['balance_error']:.2g} % of the work (limit 1 %): lower solver.safety"
+            f"the energy ledger misses {percent(energy['balance_error'])} of the work (limit 1 %): lower solver.safety"
         )
     if whole and energy["kinetic_over_internal"] > MOST_KINETIC:
         found.append(
-            f"kinetic energy reaches {100 * energy['kinetic_over_internal']:.2g} % of the internal energy (limit 5 %): "
+            f"kinetic energy reaches {percent(energy['kinetic_over_internal'])} of the internal energy (limit 5 %): "
             "lengthen loading.duration_s"
+            + (
+                f", or lower solver.least_step_s, which scales the mass by up to {inertia:.2g}"
+                if inertia > MUCH_INERTIA
+                else ""
+            )
         )
     if penetration > MOST_PENETRATION:
         found.append(
-            f"the fabric sinks {100 * penetration:.2g} % of its thickness into a tool (limit 5 %): raise "
+            f"the fabric sinks {percent(penetration)} of its thickness into a tool (limit 5 %): raise "
             "contact.*.stiffness_N_per_mm3"
         )
     return found

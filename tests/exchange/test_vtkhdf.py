@@ -77,6 +77,45 @@ def test_series_goes_on_after_its_last_step(path):
         np.testing.assert_array_equal(file["VTKHDF/Points"][-6:], frame(STEPS)[1])
 
 
+def test_series_goes_on_where_the_end_of_its_file_is_missing(path):
+    """As after a full disk; the last step may be what is missing, so it is written again."""
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size - 100)
+    with pytest.raises(OSError, match="truncated"):
+        h5py.File(path)
+    with Series(path, CONNECTIVITY, OFFSETS, 6, ("displacement_mm",), resume=True) as series:
+        assert series.steps == STEPS - 1
+        series.append(*frame(STEPS), displacement_mm=40.0)
+    with h5py.File(path) as file:
+        assert file["VTKHDF/Steps"].attrs["NSteps"] == STEPS
+        for place, step in enumerate([*range(STEPS - 1), STEPS]):
+            _, points, _, cell_data = frame(step)
+            np.testing.assert_array_equal(file["VTKHDF/Points"][6 * place : 6 * place + 6], points)
+            for name, values in cell_data.items():
+                np.testing.assert_array_equal(file["VTKHDF/CellData"][name][2 * place : 2 * place + 2], values)
+
+
+def test_series_goes_on_after_a_first_step_that_broke_off(tmp_path, monkeypatch):
+    path = tmp_path / "a.vtkhdf"
+    extend = Series._extend
+
+    def break_off(series, name, start, values):
+        if name.startswith("VTKHDF/CellData"):
+            raise OSError("no space left")
+        extend(series, name, start, values)
+
+    with Series(path, CONNECTIVITY, OFFSETS, 6) as series, monkeypatch.context() as broken:
+        broken.setattr(Series, "_extend", break_off)
+        with pytest.raises(OSError, match="no space"):
+            series.append(*frame(0))
+    with Series(path, CONNECTIVITY, OFFSETS, 6, resume=True) as series:
+        assert series.steps == 0
+        series.append(*frame(0))
+    with h5py.File(path) as file:
+        assert file["VTKHDF/Steps"].attrs["NSteps"] == 1
+        np.testing.assert_array_equal(file["VTKHDF/Points"][:], frame(0)[1])
+
+
 def test_vtk_reads_moving_points_and_cell_data(path):
     vtk = pytest.importorskip("vtkmodules.vtkIOHDF")
     from vtkmodules.util.numpy_support import vtk_to_numpy

@@ -83,27 +83,36 @@ def _targets(cases: list[dict[str, Any]]) -> list[str]:
         for case in cases:
             same = (case["cells"], case["contact"], case["threads"]) == (side**2, contact, threads)
             if same and case["program"] == "weftform" and "ratio_to_c" in case:
-                verdict = "met" if case["ratio_to_c"] <= limit else "missed"
                 on = "1 thread" if threads == 1 else f"{threads} threads"
                 lines.append(
                     f"| {side} x {side}, {'contact' if contact else 'no contact'}, {on} | {limit} x C | "
-                    f"{case['ratio_to_c']:.2f} | {case['loop_ratio_to_c']:.2f} | {verdict} |"
+                    f"{case['ratio_to_c']:.2f} | {case['loop_ratio_to_c']:.2f} | {_verdict(case['ratio_to_c'], limit)} |"
                 )
     return lines
 
 
+def _verdict(measured: float, most: float) -> str:
+    return "met" if measured <= most else "missed"
+
+
 def _start_up(machine: dict[str, Any]) -> list[str]:
     first, bare, drawn = machine["start_up"], machine["whole_run_no_figures"], machine["whole_run_figures"]
+    rows = (
+        ("process start to first step, kernels cached", first["warm_s"], 1.0),
+        ("the same with an empty cache", first["cold_s"], None),
+        ("time loop", bare["loop_s"], 0.8),
+        ("whole process less time loop, `--no-figures`", bare["rest_s"], 1.2),
+        ("whole process less time loop, with figures", drawn["rest_s"], 5.0),
+    )
     return [
         "## Start and whole runs of `hemisphere-0-90`",
         "",
-        "| | seconds | target |",
-        "|---|---|---|",
-        f"| process start to first step, kernels cached | {first['warm_s']:.2f} | 1 |",
-        f"| the same with an empty cache | {first['cold_s']:.1f} | |",
-        f"| time loop | {bare['loop_s']:.2f} | 0.8 |",
-        f"| whole process less time loop, `--no-figures` | {bare['rest_s']:.2f} | 1.2 |",
-        f"| whole process less time loop, with figures | {drawn['rest_s']:.2f} | 5 |",
+        "| | seconds | target | |",
+        "|---|---|---|---|",
+        *(
+            f"| {what} | {seconds:.2f} | " + (f"{most:g} | {_verdict(seconds, most)} |" if most else "| |")
+            for what, seconds, most in rows
+        ),
         "",
     ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 from weftform import __version__
 from weftform.cli.bodies import VERBS
 from weftform.cli.characterise import app as characterise
-from weftform.errors import WeftformError
+from weftform.errors import ResultError, WeftformError
 
 app = typer.Typer(
     name="weftform",
@@ -60,6 +61,11 @@ def main() -> None:
             raise
         typer.secho("error: ", fg="red", bold=True, err=True, nl=False)
         typer.echo(str(problem), err=True)
+        if isinstance(problem, ResultError):
+            # HDF5 crashes when it puts away a file that it could not write
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(problem.exit_code)
         sys.exit(problem.exit_code)
     except KeyboardInterrupt:
         typer.secho("interrupted", fg="yellow", err=True)

@@ -50,6 +50,9 @@ def run(
                 loaded, folder, threads=threads, device=cast("Device", device), resume=resume, watch=display.watch
             )
     except KeyboardInterrupt:
+        if not (folder / "checkpoint.npz").exists():
+            typer.secho("\ninterrupted before there was anything to keep", fg="yellow", err=True)
+            raise typer.Exit(130) from None
         typer.secho(f"\ninterrupted; what was computed is in {folder}", fg="yellow", err=True)
         again = shlex.join(["weftform", "run", str(folder / "study.toml"), "--out", str(folder), "--resume"])
         typer.echo(f"go on with: {again}", err=True)

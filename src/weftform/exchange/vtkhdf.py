@@ -5,6 +5,8 @@ Written step by step: each step is on disk when :meth:`Series.append` returns, s
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,6 +18,25 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 TRIANGLE, QUAD = 5, 9
+
+CUT_SHORT = re.compile(r"truncated file: eof = \d+, .*stored_eof = (\d+)")
+"""What HDF5 says of a file that ends before it should."""
+
+
+def _reopened(path: Path) -> tuple[h5py.File, bool]:
+    """A file to go on with, and whether it was whole.
+
+    Where a disk was full the end of a file is missing, and HDF5 refuses it; made as long as it should be it opens, with all that
+    had reached the disk before.
+    """
+    try:
+        return h5py.File(path, "r+"), True
+    except OSError as problem:
+        cut = CUT_SHORT.search(str(problem))
+        if cut is None:
+            raise
+        os.truncate(path, int(cut.group(1)))
+        return h5py.File(path, "r+"), False
 
 
 class Series:
@@ -51,9 +72,10 @@ class Series:
         self.cells = len(offsets) - 1
         self._found: dict[str, Any] = {}
         if resume:
-            self._file = h5py.File(path, "r+")
+            self._file, whole = _reopened(path)
             self._root = self._file["VTKHDF"]
-            self.steps = int(self._root["Steps"].attrs["NSteps"])
+            # of a file whose end is missing, the last step was being written
+            self.steps = max(int(self._root["Steps"].attrs["NSteps"]) - (not whole), 0)
             return
         self.steps = 0
         self._file = h5py.File(path, "w")
@@ -112,7 +134,7 @@ class Series:
             self._extend(name, n, np.array([value]))
         for kind, fields in (("PointData", point_data), ("CellData", cell_data)):
             for name, values in fields.items():
-                if n == 0:
+                if n == 0 and name not in root[kind]:
                     self._growing(root[kind], name, 1 if values.ndim == 1 else values.shape[1], len(values))
                     steps[f"{kind}Offsets"].create_dataset(name, (0,), np.int64, maxshape=(None,), chunks=(64,))
                 self._extend(f"VTKHDF/Steps/{kind}Offsets/{name}", n, np.array([n * len(values)]))
@@ -133,8 +155,8 @@ class Series:
     def _extend(self, name: str, start: int, values: NDArray[Any]) -> None:
         """Write rows of a dataset from ``start`` on; what lay there belongs to a step that was never completed.
 
-        By h5py's low-level calls: a step is some thirty small writes, and working out what ``dataset[start:] = values``
-        means costs ten times as much as the write.
+        By h5py's low-level calls: a step is some thirty small writes, and with ``dataset[start:] = values`` each takes four
+        times as long.
         """
         if name not in self._found:
             self._found[name] = self._file[name].id

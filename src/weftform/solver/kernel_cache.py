@@ -16,6 +16,11 @@ import numba
 import platformdirs
 
 
+def user_folder() -> Path:
+    """Where the user's programs keep what they can make again."""
+    return Path(platformdirs.user_cache_dir("weftform", appauthor=False))
+
+
 def kernel_folder() -> Path:
     """The folder for this version of the kernels; in the temporary folder where the user's cache cannot be written."""
     package = Path(__file__).resolve().parents[1]
@@ -25,7 +30,7 @@ def kernel_folder() -> Path:
             digest.update(source.read_bytes())
     name = f"kernels-{digest.hexdigest()[:16]}"
     for base in (
-        Path(platformdirs.user_cache_dir("weftform", appauthor=False)),
+        user_folder(),
         Path(tempfile.gettempdir()) / f"weftform-{os.getuid() if hasattr(os, 'getuid') else 'user'}",
     ):
         folder = base / name

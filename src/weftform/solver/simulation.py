@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-SURVEY_EVERY = 160
+SURVEY_EVERY = 176
 """Most steps between surveys of the state (stiffness, contact search)."""
 LEDGER_EVERY = 8
 """Surveys between entries of the energy ledger."""

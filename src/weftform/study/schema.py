@@ -111,7 +111,7 @@ class FormingLoading(Declared):
     duration_s: Positive
     ramp: Ramp = 0.2
     end_ramp: Ramp | None = None
-    """Of the end; like ``ramp`` without. At the end the fabric is tight, and a short one does no harm."""
+    """Of the end; like ``ramp`` without. At a given duration a short one leaves the speed on the way lower."""
 
 
 class SolverTable(Declared):

@@ -197,15 +197,18 @@ class Study:
                     got=f"{nearest:g} mm",
                 )
             for other, punch in model.tools.items():
-                if punch.motion != "stroke" or punch.side == table.side or punch.diameter_mm is None:
+                if punch.motion != "stroke" or punch.diameter_mm is None:
                     continue
-                gap = 0.5 * (hole - punch.diameter_mm)
-                if gap < self.fabric.thickness:
+                # a ring around the punch, or an opening that it enters with the fabric on both sides
+                within = punch.side == table.side
+                needed = punch.diameter_mm + (0.0 if within else 2.0 * self.fabric.thickness)
+                if hole < needed:
                     raise StudyError(
-                        f"the {other} does not fit through the {name} with the fabric between them",
-                        key=f"tools.{other}.diameter_mm",
-                        expected=f"a gap of at least the thickness, {self.fabric.thickness:g} mm",
-                        got=f"{gap:g} mm",
+                        f"the {other} does not fit through the {name}"
+                        + ("" if within else " with the fabric between them"),
+                        key=f"tools.{name}.hole_diameter_mm",
+                        expected=f"at least {needed:g} mm for the diameter of {punch.diameter_mm:g} mm",
+                        got=f"{hole:g} mm",
                     )
 
     def to_toml(self, header: str = "") -> str:
@@ -296,13 +299,39 @@ def _changed(values: dict[str, Any], path: list[str], value: Any) -> dict[str, A
     return merge_tables(values, {path[0]: nested})
 
 
+def _brought(change: str, value: Any, problem: StudyError | CardError) -> bool:
+    """Whether a change has brought the key that a problem is about."""
+    if not problem.key:
+        return change == "fabric.card" and isinstance(problem, CardError) and problem.file is None
+    if isinstance(problem, CardError) and problem.file is not None:
+        # a key of the card, which the study may override
+        place = ("fabric", "override", *problem.key.split("."))
+        return place[:2] == tuple(change.split(".")[:2]) and _holds(value, place, change.split("."))
+    # a table that nobody knows has no line in the study either
+    unknown = problem.message.startswith("unknown key") and change.startswith(f"{problem.key}.")
+    return unknown or f"{problem.key}.".startswith(f"{change}.")
+
+
+def _holds(value: Any, place: tuple[str, ...], change: list[str]) -> bool:
+    """Whether a change of ``change`` to ``value`` sets ``place`` or something in it."""
+    if len(change) >= len(place):
+        return tuple(change[: len(place)]) == place
+    if tuple(change) != place[: len(change)]:
+        return False
+    for part in place[len(change) :]:
+        if not isinstance(value, Mapping) or part not in value:
+            return False
+        value = value[part]
+    return True
+
+
 def _placed(
     problem: StudyError | CardError, path: Path, text: str, changes: Mapping[str, Any]
 ) -> StudyError | CardError:
     """The same error with its place: the change that it is about, or else the file and line of a key of the study."""
-    if problem.file is not None and Path(problem.file) != path:
+    change = next((key for key, value in changes.items() if _brought(key, value, problem)), None)
+    if problem.file is not None and Path(problem.file) != path and change is None:
         return problem
-    change = next((key for key in changes if problem.key and f"{problem.key}.".startswith(f"{key}.")), None)
     place: Path | str | None = problem.file
     line = problem.line
     if change is not None:
