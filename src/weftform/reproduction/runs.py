@@ -24,7 +24,7 @@ RUNS: dict[str, tuple[str, tuple[str, ...]]] = {
         "hemisphere-0-90",
         ("blank.cell_length_mm=1.92", "solver.least_step_s=1.43e-6", "output.frames=2"),
     ),
-    "hemisphere-slow": ("hemisphere-0-90", ("loading.duration_s=0.27", "output.frames=2")),
+    "hemisphere-slow": ("hemisphere-0-90", ("loading.duration_s=0.285", "output.frames=2")),
     "hemisphere-coarse": ("hemisphere-0-90", ("blank.cell_length_mm=3.77", "output.frames=2")),
     "bias-slow": ("bias-extension", (*SHORT[:1], "loading.duration_s=0.8", *SHORT[2:])),
     "bias-fine": ("bias-extension", (*SHORT, "specimen.cell_length_mm=1.96")),
