@@ -455,6 +455,8 @@ def test_missing_file_is_refused_with_what_lies_near(tmp_path):
 
 def test_unknown_name_is_refused_with_the_shipped_ones():
     assert "hemisphere-45" in refused("hemisphere-90").expected
+    assert refused("hemisfere").hint == "did you mean hemisphere-45?"
+    assert "weftform new" in refused("qqq").hint
 
 
 @pytest.mark.parametrize(

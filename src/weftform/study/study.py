@@ -73,10 +73,13 @@ class Study:
         shipped = shipped_studies()
         path = shipped[str(study)] if str(study) in shipped else Path(study)
         if not path.exists() and path.suffix != ".toml":
+            close = difflib.get_close_matches(str(study), shipped, 1, 0.5)
             raise StudyError(
                 f'no study named "{study}"',
                 expected="a shipped study (" + ", ".join(shipped) + ") or a file ending in .toml",
-                hint="`weftform studies` lists the shipped studies, `weftform new` writes one to start from",
+                hint=f"did you mean {close[0]}?"
+                if close
+                else "`weftform studies` lists the shipped studies, `weftform new` writes one to start from",
             )
         values, text = read_toml(path, StudyError)
         pairs = list(changes.items()) if isinstance(changes, Mapping) else [_split_change(c) for c in changes]
