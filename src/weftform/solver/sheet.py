@@ -198,7 +198,10 @@ class Sheet:
 
     def vectors(self, first: int) -> Floats:
         """Three fields of the state, shape [rows, columns, 3]."""
-        return np.stack([self.state[self.row_index, first + c, : self.columns] for c in range(3)], axis=-1)
+        vectors = np.empty((len(self.row_index), self.columns, 3))
+        for c in range(3):
+            vectors[..., c] = self.state[self.row_index, first + c, : self.columns]
+        return vectors
 
 
 def inertia_area(grid: YarnGrid) -> Floats:

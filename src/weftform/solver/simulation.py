@@ -59,6 +59,7 @@ class Simulation:
         self.problem = problem
         self.device = device
         self.rows, self.columns = grid.shape
+        self._outside = np.nonzero(~grid.active)
         self.bands = max(1, min(threads, self.rows // 4)) if device == "cpu" else 1
         self.density = fabric.areal_density * problem.settings.mass_scaling
         self.material = Material(fabric, grid, problem.settings.hourglass)
@@ -312,8 +313,9 @@ class Simulation:
     def positions(self) -> Floats:
         """Positions of the crossings [mm], shape [rows, columns, 3]; flat where they are not part of the blank."""
         self._sync("moving")
-        grid = self.problem.grid
-        return np.where(grid.active[..., None], self.sheet.vectors(at.POSITION), grid.flat)
+        places = self.sheet.vectors(at.POSITION)
+        places[self._outside] = self.problem.grid.flat[self._outside]
+        return places
 
     @property
     def velocities(self) -> Floats:
