@@ -106,8 +106,6 @@ LIMITS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at m
 
 def wanted(declared: Any) -> str | None:
     """What a declared place takes, in words: ``a number, greater than 0 and at most 0.5``; None where words are lacking."""
-    if declared in NAMES:
-        return NAMES[declared]
     origin, arguments = get_origin(declared), get_args(declared)
     if origin is Annotated:
         kind, *metadata = arguments
@@ -128,7 +126,7 @@ def wanted(declared: Any) -> str | None:
         return wanted(choices[0]) if len(choices) == 1 else None
     if origin is None and (table := _model_in(declared)) is not None:
         return "a table with the keys " + ", ".join(table.model_fields)
-    return None
+    return NAMES.get(declared) if origin is None else None
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

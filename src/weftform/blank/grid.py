@@ -250,6 +250,11 @@ class YarnGrid:
         return rows, columns
 
     @cached_property
+    def outside(self) -> tuple[NDArray[np.intp], ...]:
+        """Rows and columns of the places where no crossing of the blank is."""
+        return np.nonzero(~self.active)
+
+    @cached_property
     def corners_known(self) -> NDArray[np.bool_]:
         """Corners of cells at which two connectors meet, or one and the mirror image of another: shape [4, rows - 1,
         columns - 1] in the order of :data:`CORNERS`.

@@ -82,11 +82,7 @@ class Machine:
             self.knots[k] = n
         peak = python_function(peak_speed)(*self.ramps)
         self.legs = [
-            (
-                times[:-1],
-                times[1:],
-                np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300) * peak,
-            )
+            (times[:-1], times[1:], peak * np.abs(np.diff(values)) / np.maximum(np.diff(times), 1e-300))
             for times, values in ((np.array(motion.times), np.array(motion.values)) for motion in motions)
         ]
 

@@ -59,7 +59,6 @@ class Simulation:
         self.problem = problem
         self.device = device
         self.rows, self.columns = grid.shape
-        self._outside = np.nonzero(~grid.active)
         self.bands = max(1, min(threads, self.rows // 4)) if device == "cpu" else 1
         self.density = fabric.areal_density * problem.settings.mass_scaling
         self.material = Material(fabric, grid, problem.settings.hourglass)
@@ -313,8 +312,8 @@ class Simulation:
     def positions(self) -> Floats:
         """Positions of the crossings [mm], shape [rows, columns, 3]; flat where they are not part of the blank."""
         self._sync("moving")
-        places = self.sheet.vectors(at.POSITION)
-        places[self._outside] = self.problem.grid.flat[self._outside]
+        places, grid = self.sheet.vectors(at.POSITION), self.problem.grid
+        places[grid.outside] = grid.flat[grid.outside]
         return places
 
     @property
